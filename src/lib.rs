@@ -4,3 +4,4 @@
 //! `ARCHITECTURE.md` says what each is for, and `tests/architecture.rs` holds the code to it.
 
 pub mod math;
+pub mod scene;

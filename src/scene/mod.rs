@@ -1,0 +1,16 @@
+//! Plain data of what is rendered, and its validation. A [`Scene`] that exists is valid: everything
+//! wrong with the input was said while it was built.
+
+pub mod camera;
+pub mod error;
+pub mod image;
+pub mod material;
+pub mod mesh;
+pub mod texture;
+
+pub use camera::Camera;
+pub use error::{SceneError, Warnings};
+pub use image::Image;
+pub use material::Material;
+pub use mesh::Mesh;
+pub use texture::Texture;

@@ -1,0 +1,167 @@
+//! Textures: where a material's values come from when they are not constant.
+
+use super::SceneError;
+use glam::{Affine2, Mat2, Vec2, Vec4};
+use serde::Deserialize;
+
+/// What lies outside [0,1] of an image's coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Wrap {
+    /// The picture again.
+    #[default]
+    Repeat,
+    /// The edge's texel.
+    Clamp,
+    /// The picture mirrored.
+    Mirror,
+    /// Transparent black.
+    Black,
+}
+
+/// How an image is reconstructed between texel centres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Reconstruction {
+    /// Bilinear.
+    #[default]
+    Linear,
+    /// Nearest texel.
+    Closest,
+}
+
+/// An image mapped by a UV set.
+#[derive(Clone, Debug)]
+pub struct ImageTexture {
+    /// Index of the image in the scene.
+    pub image: u32,
+    /// Name of the UV attribute; empty is the mesh's first one.
+    pub uv: String,
+    /// UV to picture coordinates, (0,0) at the bottom left.
+    pub transform: Affine2,
+    /// Wrap along s and t.
+    pub wrap: [Wrap; 2],
+    /// Reconstruction filter.
+    pub filter: Reconstruction,
+    /// Factor of the decoded value.
+    pub scale: Vec4,
+    /// Added after the factor.
+    pub bias: Vec4,
+}
+
+/// A texture: a function of the surface point with an RGBA value.
+#[derive(Clone, Debug)]
+pub enum Texture {
+    /// The same everywhere.
+    Constant(Vec4),
+    /// A picture.
+    Image(Box<ImageTexture>),
+    /// A colour attribute of the mesh, or `default` where the mesh has none of that name.
+    Attribute {
+        /// Name of the attribute.
+        name: String,
+        /// Value where the mesh has no such attribute.
+        default: Vec4,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+enum Json {
+    Constant {
+        value: [f32; 4],
+    },
+    Image {
+        image: u32,
+        #[serde(default)]
+        uv: String,
+        #[serde(default = "identity")]
+        transform: [f32; 6],
+        #[serde(default)]
+        wrap_s: Wrap,
+        #[serde(default)]
+        wrap_t: Wrap,
+        #[serde(default)]
+        filter: Reconstruction,
+        #[serde(default = "ones")]
+        scale: [f32; 4],
+        #[serde(default)]
+        bias: [f32; 4],
+    },
+    Attribute {
+        name: String,
+        default: [f32; 4],
+    },
+}
+
+fn identity() -> [f32; 6] {
+    [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+}
+
+fn ones() -> [f32; 4] {
+    [1.0; 4]
+}
+
+impl Texture {
+    /// A texture from its JSON description (`docs/abi.md`); `image_count` images exist.
+    pub fn from_json(name: &str, json: &str, image_count: usize) -> Result<Self, SceneError> {
+        let fail = |problem: String| SceneError::new(format!("texture {name:?}"), problem);
+        let finite = |what: &str, values: &[f32]| match values.iter().all(|v| v.is_finite()) {
+            true => Ok(()),
+            false => Err(fail(format!("{what} has a value that is not finite"))),
+        };
+        match serde_json::from_str(json).map_err(|e| fail(e.to_string()))? {
+            Json::Constant { value } => {
+                finite("value", &value)?;
+                Ok(Self::Constant(value.into()))
+            }
+            Json::Image { image, uv, transform, wrap_s, wrap_t, filter, scale, bias } => {
+                if image as usize >= image_count {
+                    return Err(fail(format!("there is no image {image}")));
+                }
+                finite("transform", &transform)?;
+                finite("scale", &scale)?;
+                finite("bias", &bias)?;
+                let [a, b, c, d, e, f] = transform;
+                Ok(Self::Image(Box::new(ImageTexture {
+                    image,
+                    uv,
+                    transform: Affine2::from_mat2_translation(
+                        Mat2::from_cols(Vec2::new(a, d), Vec2::new(b, e)),
+                        Vec2::new(c, f),
+                    ),
+                    wrap: [wrap_s, wrap_t],
+                    filter,
+                    scale: scale.into(),
+                    bias: bias.into(),
+                })))
+            }
+            Json::Attribute { name: attribute, default } => {
+                finite("default", &default)?;
+                Ok(Self::Attribute { name: attribute, default: default.into() })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn descriptions_are_read_and_checked() {
+        let t = Texture::from_json("t", r#"{"type":"image","image":0,"transform":[2,0,0.5,0,3,0.25]}"#, 1)
+            .unwrap();
+        let Texture::Image(t) = t else { panic!("not an image") };
+        assert_eq!(t.transform.transform_point2(Vec2::ONE), Vec2::new(2.5, 3.25));
+        for (json, what) in [
+            (r#"{"type":"image","image":1}"#, "no image 1"),
+            (r#"{"type":"image","image":0,"wrap":"x"}"#, "wrap"),
+            (r#"{"type":"noise"}"#, "noise"),
+            (r#"{"type":"constant","value":[1,2,3]}"#, "length"),
+        ] {
+            let e = Texture::from_json("t", json, 1).unwrap_err().to_string();
+            assert!(e.contains(what), "{json}: {e}");
+        }
+    }
+}
