@@ -1,6 +1,7 @@
 //! Frames, warps, random sequences, colour, tabulated distributions. `glam` types throughout.
 
 pub mod color;
+pub mod density;
 pub mod distribution;
 pub mod frame;
 pub mod sampler;
