@@ -4,6 +4,7 @@
 pub mod camera;
 pub mod error;
 pub mod image;
+pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod texture;
@@ -11,6 +12,7 @@ pub mod texture;
 pub use camera::Camera;
 pub use error::{SceneError, Warnings};
 pub use image::Image;
+pub use light::{Light, LightKind, LightSpec};
 pub use material::Material;
 pub use mesh::Mesh;
 pub use texture::Texture;
