@@ -1,0 +1,1 @@
+"""Generators of the gallery's stages and textures."""
