@@ -1,0 +1,241 @@
+"""`segue render`: a stage to a picture."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import signal
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from .. import images
+from ..render import Render
+from ..scene import Scene
+from . import output
+from .curve import Curve
+from .progress import Progress, clock
+from .status import InputError, Status, UsageError
+
+#: When to stop where nothing is said.
+DEFAULT_THRESHOLD, DEFAULT_SECONDS = 0.003, 600.0
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)[xX](\d+)", text)
+    if not match or not (int(match[1]) and int(match[2])):
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, such as 1280x720")
+    return int(match[1]), int(match[2])
+
+
+def _frames(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(-?\d+):(-?\d+)", text)
+    if not match or int(match[1]) > int(match[2]):
+        raise argparse.ArgumentTypeError(f"{text!r} is not FIRST:LAST, such as 1:24")
+    return int(match[1]), int(match[2])
+
+
+def _positive(text: str) -> float:
+    number = float(text)
+    if not 0 < number < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return number
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not at least 1")
+    return number
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Adds the subcommand."""
+    parser = commands.add_parser(
+        "render",
+        help="render a stage",
+        description="Renders a USD stage. Without --samples, --time and --noise-threshold it stops "
+        f"at an estimated relative mean squared error of {DEFAULT_THRESHOLD:g}, or after "
+        f"{DEFAULT_SECONDS / 60:g} minutes.",
+    )
+    add = parser.add_argument
+    add("stage", metavar="STAGE", help="a .usd, .usda, .usdc or .usdz file")
+    add(
+        "-o",
+        "--output",
+        required=True,
+        metavar="OUT.exr",
+        type=Path,
+        help="the picture; a .png is written in addition to an .exr beside it, tonemapped "
+        f"({output.TONEMAPPING}). With --frames the number replaces #### or %%04d",
+    )
+    add("--integrator", metavar="NAME", help="method (default: the engine's)")
+    stop = parser.add_mutually_exclusive_group()
+    stop.add_argument("--samples", type=_count, metavar="N", help="stop after N samples a pixel")
+    stop.add_argument("--time", type=_positive, metavar="SECONDS", help="stop after this time")
+    stop.add_argument(
+        "--noise-threshold",
+        type=_positive,
+        metavar="E",
+        help="stop at this estimated relative mean squared error",
+    )
+    add("--resolution", type=_size, metavar="WxH", help="default: the stage's, else 1280 wide")
+    add("--camera", metavar="PRIM", help="path or name of a camera (default: the stage's)")
+    frames = parser.add_mutually_exclusive_group()
+    frames.add_argument("--frame", type=float, metavar="F", help="time code")
+    frames.add_argument("--frames", type=_frames, metavar="A:B", help="every frame from A to B")
+    add("--max-depth", type=int, metavar="N", help="bounces, -1 without limit (default)")
+    add("--threads", type=int, default=0, metavar="N", help="default: all")
+    add("--seed", type=int, default=0, metavar="N", help="default: 0")
+    add("--passes", metavar="a,b,...", help="passes in the EXR beside Combined")
+    add("--reference", metavar="REF.exr", help="measure the error against this picture")
+    add("--stats", type=Path, metavar="STATS.json", help="write statistics")
+    add("--quiet", action="store_true", help="say nothing but errors")
+    parser.set_defaults(run=run)
+
+
+class _Cancellation:
+    """SIGINT and SIGTERM stop the render; a second one stops the program."""
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> _Cancellation:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self.requested = True
+        signal.signal(number, self._before[number])
+
+
+def run(options: argparse.Namespace) -> Status:
+    """Renders one frame or several."""
+    output.check_path(options.output)
+    if options.stats is not None and not options.stats.parent.is_dir():
+        raise UsageError(f"{options.stats}: the folder {options.stats.parent} does not exist")
+    reference = images.read_rgb(options.reference) if options.reference else None
+    first, last = options.frames or (None, None)
+    frames = [options.frame] if first is None else [float(f) for f in range(first, last + 1)]
+    collected = []
+    with _Cancellation() as cancellation:
+        for frame in frames:
+            stats = _render_frame(options, frame, len(frames) > 1, reference, cancellation)
+            if stats is not None:
+                collected.append(stats)
+            if cancellation.requested:
+                break
+    if options.stats is not None and collected:
+        result = collected[0] if options.frames is None else {"frames": collected}
+        options.stats.write_text(json.dumps(result, indent=2) + "\n")
+    return Status.CANCELLED if cancellation.requested else Status.DONE
+
+
+def _settings(options: argparse.Namespace) -> dict[str, Any]:
+    """The engine's settings that the command line gives; what it leaves unsaid stays unsaid."""
+    settings: dict[str, Any] = {"threads": options.threads, "seed": options.seed}
+    if options.integrator:
+        settings["integrator"] = options.integrator
+    if options.max_depth is not None:
+        settings["max_depth"] = options.max_depth
+    if options.passes:
+        named = [p.strip() for p in options.passes.split(",") if p.strip()]
+        settings["passes"] = ["Combined", *(p for p in named if p != "Combined")]
+    if options.samples:
+        settings["samples"] = options.samples
+    elif options.time:
+        settings["time"] = options.time
+    elif options.noise_threshold:
+        settings["noise_threshold"] = options.noise_threshold
+    else:
+        settings["noise_threshold"] = DEFAULT_THRESHOLD
+        settings["time"] = DEFAULT_SECONDS
+    return settings
+
+
+def _render_frame(
+    options: argparse.Namespace,
+    frame: float | None,
+    many: bool,
+    reference: np.ndarray | None,
+    cancellation: _Cancellation,
+) -> dict[str, Any] | None:
+    """Renders and writes one frame; returns its statistics, None if it was cancelled early."""
+    from .. import usd
+
+    began = time.perf_counter()
+    scene: Scene = Scene()
+    stage = usd.load(
+        options.stage,
+        frame=frame,
+        camera=options.camera,
+        resolution=options.resolution,
+        scene=scene,
+    )
+    loading = time.perf_counter() - began
+    _say(options, stage.report.text())
+    if cancellation.requested:
+        return None
+    render = Render(scene, {**stage.settings(), **_settings(options)})
+    unsupported = [str(e) for e in stage.report.of(usd.Kind.UNSUPPORTED)]
+    del scene, stage.scene
+    curve = None
+    if reference is not None:
+        try:
+            curve = Curve(render, reference)
+        except ValueError as error:
+            raise InputError(f"{options.reference}: {error}") from None
+    path = output.frame_path(options.output, frame, many)
+    with Progress(path.name, options.quiet) as progress:
+
+        def on_progress(report: dict[str, Any]) -> bool:
+            progress.update(report)
+            if curve is not None:
+                curve.update(report)
+            return cancellation.requested
+
+        render.run(on_progress)
+    stats = render.stats()
+    stats["loading_seconds"] = loading + float(stats.get("build_seconds", 0.0))
+    stats["unsupported"] = unsupported
+    if curve is not None:
+        stats["curve"] = curve.finish(stats)
+        stats["seconds"] -= curve.cost
+        stats["cpu_seconds"] -= curve.cpu_cost
+    else:
+        for point in stats.get("curve", []):
+            point.setdefault("mape", None)
+            point.setdefault("relmse", None)
+    written = output.write(render, path, {"segue:stage": str(options.stage)})
+    _say(options, _summary(stats, written))
+    return stats
+
+
+def _summary(stats: dict[str, Any], written: list[Path]) -> str:
+    parts = [
+        f"{', '.join(str(p) for p in written)}: {stats['samples']:g} samples",
+        f"{clock(stats['seconds'])} rendering, {clock(stats['loading_seconds'])} loading",
+    ]
+    if stats.get("non_finite"):
+        parts.append(f"{stats['non_finite']} non-finite samples were dropped")
+    if stats.get("curve"):
+        last = stats["curve"][-1]
+        if last.get("mape") is not None:
+            parts.append(f"MAPE {last['mape']:.4g}, relMSE {last['relmse']:.4g}")
+    return "; ".join(parts)
+
+
+def _say(options: argparse.Namespace, text: str) -> None:
+    if text and not options.quiet:
+        print(text, file=sys.stderr)

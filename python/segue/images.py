@@ -1,0 +1,161 @@
+"""Pictures from files, through OpenImageIO, in their own pixel type."""
+
+from __future__ import annotations
+
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+class ImageError(Exception):
+    """A picture could not be read; the text says why."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Pixels and what their file says of them.
+
+    Attributes:
+        pixels: (h, w, c), 1 to 4 channels, uint8, uint16, float16 or float32, row 0 on top; colour
+            is not multiplied by alpha, and not decoded.
+        colorspace: the file's own word on its colour space, or "".
+        wrap: the file's word on tiling in s and t, as in OpenEXR's `wrapmodes`, or "".
+    """
+
+    pixels: np.ndarray
+    colorspace: str
+    wrap: str
+
+    @property
+    def is_8_bit(self) -> bool:
+        """Whether the file holds bytes."""
+        return self.pixels.dtype == np.uint8
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether there is an alpha channel that is not 1 everywhere."""
+        if self.pixels.shape[2] not in (2, 4):
+            return False
+        alpha = self.pixels[:, :, -1]
+        one = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
+        return bool((alpha != one).any())
+
+
+def read(path: str) -> Picture:
+    """Reads a file, or one in a package as USD writes it: `asset.usdz[texture.png]`.
+
+    Raises:
+        ImageError: it is missing, broken, or OpenImageIO is not installed.
+    """
+    if not path.endswith("]") or "[" not in path:
+        return _read_file(path)
+    outer, inner = path.split("[", 1)
+    try:
+        data = Path(outer).read_bytes()
+        # Packages may be nested: a.usdz[b.usdz[c.png]].
+        names = inner.rstrip("]").split("[")
+        for name in names:
+            with zipfile.ZipFile(BytesIO(data)) as archive:
+                data = archive.read(name)
+    except (OSError, KeyError, zipfile.BadZipFile) as error:
+        raise ImageError(f"{path}: {error}") from error
+    with tempfile.NamedTemporaryFile(suffix=Path(names[-1]).suffix) as file:
+        file.write(data)
+        file.flush()
+        return _read_file(file.name)
+
+
+def _oiio() -> Any:
+    try:
+        import OpenImageIO
+    except ImportError as error:
+        raise ImageError("pictures need OpenImageIO: install segue[images]") from error
+    return OpenImageIO
+
+
+def _read_file(path: str) -> Picture:
+    oiio = _oiio()
+    config = oiio.ImageSpec()
+    # Without this the reader multiplies the colours of a PNG by its alpha.
+    config["oiio:UnassociatedAlpha"] = 1
+    file = oiio.ImageInput.open(path, config)
+    if file is None:
+        raise ImageError(oiio.geterror() or f"{path} cannot be opened")
+    try:
+        spec = file.spec()
+        if spec.deep:
+            raise ImageError(f"{path} is a deep picture")
+        channels = _channels(list(spec.channelnames))
+        base = str(spec.format)
+        kind = {"uint8": "uint8", "uint16": "uint16", "half": "half"}.get(base, "float")
+        pixels = file.read_image(0, 0, 0, spec.nchannels, kind)
+        if pixels is None:
+            raise ImageError(file.geterror() or f"{path} cannot be read")
+        wrap = spec.getattribute("wrapmodes") or ""
+        colorspace = spec.getattribute("oiio:ColorSpace") or ""
+    finally:
+        file.close()
+    pixels = np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
+    if channels != list(range(spec.nchannels)):
+        pixels = np.ascontiguousarray(pixels[:, :, channels])
+    return Picture(pixels, str(colorspace), str(wrap))
+
+
+def _channels(names: list[str]) -> list[int]:
+    """Which channels to take, in the order grey, alpha or red, green, blue, alpha."""
+    lower = [n.lower().rsplit(".", 1)[-1] for n in names]
+    if all(c in lower for c in "rgb"):
+        wanted = [lower.index(c) for c in "rgb"]
+        return wanted + ([lower.index("a")] if "a" in lower else [])
+    return list(range(min(len(names), 4)))
+
+
+def read_rgb(path: str) -> np.ndarray:
+    """The linear colours of an EXR file: (h, w, 3) float32, of `R G B` or `Combined.R G B`.
+
+    Raises:
+        ImageError: it is missing, broken, or holds no colours.
+    """
+    oiio = _oiio()
+    file = oiio.ImageInput.open(str(path))
+    if file is None:
+        raise ImageError(oiio.geterror() or f"{path} cannot be opened")
+    try:
+        spec = file.spec()
+        names = list(spec.channelnames)
+        for prefix in ("", "Combined.", "ViewLayer.Combined.", "RenderLayer.Combined."):
+            wanted = [prefix + c for c in "RGB"]
+            if all(w in names for w in wanted):
+                break
+        else:
+            raise ImageError(f"{path} has no channels R, G and B, only {', '.join(names)}")
+        pixels = file.read_image(0, 0, 0, spec.nchannels, "float")
+        if pixels is None:
+            raise ImageError(file.geterror() or f"{path} cannot be read")
+    finally:
+        file.close()
+    pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    return np.ascontiguousarray(pixels[:, :, [names.index(w) for w in wanted]])
+
+
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    """Writes (h, w, 3) uint8 sRGB pixels.
+
+    Raises:
+        ImageError: the file cannot be written.
+    """
+    oiio = _oiio()
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, "uint8")
+    spec["oiio:ColorSpace"] = "sRGB"
+    file = oiio.ImageOutput.create(str(path))
+    if file is None or not file.open(str(path), spec):
+        raise ImageError(f"{path} cannot be written: {oiio.geterror()}")
+    written = file.write_image(np.ascontiguousarray(pixels))
+    if not (file.close() and written):
+        raise ImageError(f"{path} cannot be written: {file.geterror()}")

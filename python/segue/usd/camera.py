@@ -1,0 +1,268 @@
+"""Cameras and render settings: what the picture shows, and at which size."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ._pxr import Gf, Usd, UsdGeom, UsdRender
+from .report import Report
+from .transform import column_matrix, flat, without_scale
+
+#: UsdGeomCamera's apertures and focal length are in tenths of a scene unit.
+TENTH = 0.1
+#: Width of a picture for which nothing else is said.
+DEFAULT_WIDTH = 1280
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the stage says of the picture.
+
+    Attributes:
+        resolution: width and height, or None.
+        camera: path of the camera, or "".
+        pixel_aspect: width of a pixel over its height.
+        policy: UsdRender's aspectRatioConformPolicy.
+        data_window: part of the frame to render: x0, y0, x1, y1 from the bottom left, in [0, 1].
+    """
+
+    resolution: tuple[int, int] | None = None
+    camera: str = ""
+    pixel_aspect: float = 1.0
+    policy: str = "expandAperture"
+    data_window: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
+
+
+def read_settings(stage: Usd.Stage, time: Usd.TimeCode, report: Report) -> Settings:
+    """The render settings that the stage names, else those at /Render/Settings, else defaults."""
+    settings = UsdRender.Settings.GetStageRenderSettings(stage)
+    if not settings:
+        settings = UsdRender.Settings(stage.GetPrimAtPath("/Render/Settings"))
+    if not settings:
+        return Settings()
+    prim = settings.GetPrim()
+    width, height = settings.GetResolutionAttr().Get(time)
+    if width <= 0 or height <= 0:
+        report.warning(prim, f"the resolution {width} x {height}", "the default is used")
+        resolution = None
+    else:
+        resolution = (int(width), int(height))
+    cameras = settings.GetCameraRel().GetForwardedTargets()
+    aspect = float(settings.GetPixelAspectRatioAttr().Get(time))
+    window = tuple(float(v) for v in settings.GetDataWindowNDCAttr().Get(time))
+    inside = (max(window[0], 0.0), max(window[1], 0.0), min(window[2], 1.0), min(window[3], 1.0))
+    if inside != window:
+        report.unsupported(prim, f"overscan, the data window {window}", "it is cut to the frame")
+    if inside[0] >= inside[2] or inside[1] >= inside[3]:
+        report.warning(prim, f"the empty data window {window}", "the whole frame is drawn")
+        inside = (0.0, 0.0, 1.0, 1.0)
+    return Settings(
+        resolution,
+        str(cameras[0]) if cameras else "",
+        aspect if aspect > 0 else 1.0,
+        str(settings.GetAspectRatioConformPolicyAttr().Get(time)),
+        inside,
+    )
+
+
+def find_camera(
+    stage: Usd.Stage, wanted: str, settings: Settings, report: Report
+) -> Usd.Prim | None:
+    """The camera that was asked for, else the settings' one, else the stage's first.
+
+    Raises:
+        LookupError: the camera that was asked for does not exist.
+    """
+    cameras = [
+        p
+        for p in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+        if p.IsA(UsdGeom.Camera)
+    ]
+    if wanted:
+        for prim in cameras:
+            if wanted in (str(prim.GetPath()), prim.GetName()):
+                return prim
+        known = ", ".join(str(p.GetPath()) for p in cameras) or "none"
+        raise LookupError(f"there is no camera {wanted}; the stage's cameras: {known}")
+    if settings.camera:
+        prim = stage.GetPrimAtPath(settings.camera)
+        if prim and prim.IsA(UsdGeom.Camera):
+            return prim
+        report.warning("", f"the render settings name the camera {settings.camera}", "not found")
+    if len(cameras) > 1:
+        report.note(cameras[0], f"the stage has {len(cameras)} cameras", "the first one is used")
+    return cameras[0] if cameras else None
+
+
+def conform(
+    window: tuple[float, float, float, float], aspect: float, policy: str
+) -> tuple[float, float, float, float]:
+    """The camera's window (x0, x1, y0, y1) fitted to a picture of another aspect ratio.
+
+    UsdRender's aspectRatioConformPolicy; the window keeps its centre.
+    """
+    x0, x1, y0, y1 = window
+    width, height = x1 - x0, y1 - y0
+    own = width / height
+    wider = {
+        "expandAperture": aspect > own,
+        "cropAperture": aspect < own,
+        "adjustApertureWidth": True,
+        "adjustApertureHeight": False,
+    }.get(policy)
+    if wider is None:  # adjustPixelAspectRatio: the window is stretched over the picture
+        return window
+    if wider:
+        width = height * aspect
+    else:
+        height = width / aspect
+    cx, cy = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+    return cx - 0.5 * width, cx + 0.5 * width, cy - 0.5 * height, cy + 0.5 * height
+
+
+def exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
+    """The factor from radiance to pixel values.
+
+    Newer USD has a photometric model of which `exposure` is one part; older has the latter alone.
+    """
+    if hasattr(camera, "ComputeLinearExposureScale"):
+        return float(camera.ComputeLinearExposureScale(time))
+    return 2.0 ** float(camera.GetExposureAttr().Get(time) or 0.0)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A camera as `Scene.set_camera` takes it, and the picture's size.
+
+    Attributes:
+        name: path of the camera, or a word for one that was made up.
+        camera: the ABI's description.
+        resolution: width and height of the whole film.
+        crop: x0, y0, x1, y1 in pixels from the top left, or None for the whole film.
+    """
+
+    name: str
+    camera: dict[str, Any]
+    resolution: tuple[int, int]
+    crop: tuple[int, int, int, int] | None
+
+
+def read_camera(
+    prim: Usd.Prim,
+    time: Usd.TimeCode,
+    settings: Settings,
+    resolution: tuple[int, int] | None,
+    report: Report,
+) -> Frame:
+    """A UsdGeomCamera. A resolution given by hand keeps the picture's width in the scene."""
+    camera = UsdGeom.Camera(prim)
+
+    def get(attribute: Usd.Attribute) -> Any:
+        return attribute.Get(time)
+
+    world = column_matrix(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time))
+    rigid, lengths = without_scale(world)
+    if not np.allclose(lengths, lengths[0], rtol=1e-4):
+        report.unsupported(prim, "a camera with a non-uniform scale", "its scale is left away")
+    focal = float(get(camera.GetFocalLengthAttr()))
+    width = float(get(camera.GetHorizontalApertureAttr()))
+    height = float(get(camera.GetVerticalApertureAttr()))
+    if not (width > 0 and height > 0):
+        report.warning(prim, f"an aperture of {width:g} x {height:g}", "20.955 x 15.2908 is used")
+        width, height = 20.955, 15.2908
+    orthographic = get(camera.GetProjectionAttr()) == UsdGeom.Tokens.orthographic
+    if not orthographic and not focal > 0:
+        report.warning(prim, f"a focal length of {focal:g}", "50 is used")
+        focal = 50.0
+    x = float(get(camera.GetHorizontalApertureOffsetAttr()))
+    y = float(get(camera.GetVerticalApertureOffsetAttr()))
+    scale = TENTH if orthographic else 1.0 / focal
+    window = (
+        (x - 0.5 * width) * scale,
+        (x + 0.5 * width) * scale,
+        (y - 0.5 * height) * scale,
+        (y + 0.5 * height) * scale,
+    )
+    size, window = _size(window, settings, resolution)
+    description: dict[str, Any] = {
+        "type": "orthographic" if orthographic else "perspective",
+        "transform": flat(rigid),
+        "window": list(window),
+    }
+    near, far = (float(v) for v in get(camera.GetClippingRangeAttr()))
+    description["near"] = max(near, 0.0)
+    if math.isfinite(far) and far > near:
+        description["far"] = far
+    stop, distance = (
+        float(get(camera.GetFStopAttr())),
+        float(get(camera.GetFocusDistanceAttr())),
+    )
+    if stop > 0 and not orthographic:
+        if distance > 0:
+            description["aperture_radius"] = 0.5 * focal * TENTH / stop
+            description["focus_distance"] = distance
+        else:
+            report.warning(prim, "an fStop without a focusDistance", "everything is in focus")
+    if len(camera.GetClippingPlanesAttr().Get(time) or ()):
+        report.unsupported(prim, "clipping planes", "they are ignored")
+    return Frame(str(prim.GetPath()), description, size, _crop(size, settings))
+
+
+def _size(
+    window: tuple[float, float, float, float],
+    settings: Settings,
+    resolution: tuple[int, int] | None,
+) -> tuple[tuple[int, int], tuple[float, float, float, float]]:
+    """The picture's size, and the window fitted to it."""
+    aspect = (window[1] - window[0]) / (window[3] - window[2])
+    if settings.resolution:
+        w, h = settings.resolution
+        window = conform(window, settings.pixel_aspect * w / h, settings.policy)
+        if resolution is None:
+            return settings.resolution, window
+    if resolution is None:
+        return (DEFAULT_WIDTH, max(1, round(DEFAULT_WIDTH / aspect))), window
+    return resolution, conform(window, resolution[0] / resolution[1], "adjustApertureHeight")
+
+
+def _crop(size: tuple[int, int], settings: Settings) -> tuple[int, int, int, int] | None:
+    x0, y0, x1, y1 = settings.data_window
+    if (x0, y0, x1, y1) == (0.0, 0.0, 1.0, 1.0):
+        return None
+    w, h = size
+    # UsdRender: a pixel belongs to the window when its centre does.
+    crop = [math.ceil(v - 0.5) for v in (x0 * w, (1 - y1) * h, x1 * w, (1 - y0) * h)]
+    return tuple(crop) if crop[0] < crop[2] and crop[1] < crop[3] else None  # type: ignore[return-value]
+
+
+def framing_camera(
+    stage: Usd.Stage,
+    time: Usd.TimeCode,
+    purposes: tuple[str, ...],
+    settings: Settings,
+    resolution: tuple[int, int] | None,
+    z_up: bool,
+) -> Frame:
+    """A camera that sees the whole stage, for stages without one: a 35 mm lens, from the front."""
+    cache = UsdGeom.BBoxCache(time, list(purposes))
+    box: Gf.Range3d = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+    low, high = np.array(box.GetMin()), np.array(box.GetMax())
+    if box.IsEmpty() or not np.isfinite([low, high]).all():
+        low, high = -np.ones(3), np.ones(3)
+    center, radius = 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-3)
+    half = 18.0 / 35.0
+    window = (-half, half, -half * 0.5625, half * 0.5625)
+    size, window = _size(window, settings, resolution)
+    narrow = min(window[1], window[3])
+    distance = radius / math.sin(math.atan(narrow))
+    toward = np.array([0.0, -1.0, 0.0] if z_up else [0.0, 0.0, 1.0])
+    up = np.array([0.0, 0.0, 1.0] if z_up else [0.0, 1.0, 0.0])
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = np.cross(up, toward), up, toward
+    matrix[:3, 3] = center + distance * toward
+    camera = {"type": "perspective", "transform": flat(matrix), "window": list(window)}
+    return Frame("framing camera", camera, size, _crop(size, settings))

@@ -1,0 +1,63 @@
+"""Point instancers: one set of transformations for each prototype."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._pxr import Sdf, Tf, Usd, UsdGeom
+from .report import Report
+
+
+def instance_transforms(
+    instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, report: Report
+) -> list[tuple[Sdf.Path, np.ndarray]]:
+    """The instances that are there at a time, by prototype.
+
+    Inactive and invisible ids are left out. Orientations may be half or float quaternions,
+    positions are moved along authored velocities: both as `ComputeInstanceTransformsAtTime` does.
+
+    Returns:
+        (path of the prototype, (n, 4, 4) instance to instancer, for column vectors), without the
+        prototype's own transformation, in the prototypes' order.
+    """
+    prim = instancer.GetPrim()
+    targets = instancer.GetPrototypesRel().GetForwardedTargets()
+    indices = np.array(instancer.GetProtoIndicesAttr().Get(time) or (), dtype=np.int64)
+    if not len(indices):
+        report.left_out(prim, "a PointInstancer without instances")
+        return []
+    try:
+        matrices = instancer.ComputeInstanceTransformsAtTime(
+            time,
+            time,
+            UsdGeom.PointInstancer.ExcludeProtoXform,
+            UsdGeom.PointInstancer.IgnoreMask,
+        )
+        mask = np.array(instancer.ComputeMaskAtTime(time), dtype=bool)
+    except Tf.ErrorException:
+        matrices, mask = (), np.zeros(0, bool)
+    if len(matrices) != len(indices):
+        report.warning(
+            prim,
+            f"a PointInstancer with {len(indices)} instances whose positions, orientations or "
+            "scales are of another number",
+            "left out",
+        )
+        return []
+    rows = np.array(matrices, dtype=np.float64).reshape(-1, 4, 4)
+    keep = mask if len(mask) == len(indices) else np.ones(len(indices), bool)
+    known = (indices >= 0) & (indices < len(targets))
+    if not known.all():
+        report.warning(
+            prim, f"{int((~known).sum())} instances of a prototype that does not exist", "left out"
+        )
+    groups = []
+    for number, target in enumerate(targets):
+        chosen = keep & (indices == number)
+        if not chosen.any():
+            continue
+        if not instancer.GetPrim().GetStage().GetPrimAtPath(target):
+            report.warning(prim, f"the prototype {target} does not exist", "left out")
+            continue
+        groups.append((target, rows[chosen].transpose(0, 2, 1)))
+    return groups

@@ -1,0 +1,341 @@
+"""UsdLux lights as lights of the ABI, in the quantities that UsdLux defines.
+
+UsdLuxLightAPI: a light's radiance is intensity x 2^exposure x color, times the colour of its
+temperature where that is enabled, divided by its world-space surface area where `normalize` is on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..scene import Scene
+from ._pxr import Tf, Usd, UsdGeom, UsdLux
+from .report import Report
+from .texture import Textures
+from .transform import flat, is_invertible, without_scale
+
+#: Turns the dome's +Y pole to +Z; longitude 0 then points to -Y (UsdLuxDomeLight_1).
+_POLE_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
+#: Gauss-Legendre points along, and points around, for areas of stretched shapes.
+_ALONG, _AROUND = 64, 256
+
+
+def radiance(light: UsdLux.LightAPI, time: Usd.TimeCode) -> np.ndarray:
+    """L of UsdLuxLightAPI before normalisation, for each channel."""
+    color = np.array(light.GetColorAttr().Get(time), dtype=np.float64)
+    if light.GetEnableColorTemperatureAttr().Get(time):
+        kelvin = light.GetColorTemperatureAttr().Get(time)
+        color *= np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+    intensity = float(light.GetIntensityAttr().Get(time))
+    exposure = float(light.GetExposureAttr().Get(time))
+    return intensity * 2.0**exposure * color
+
+
+def is_normalized(light: UsdLux.LightAPI, time: Usd.TimeCode) -> bool:
+    """Whether the radiance is divided by the light's size."""
+    return bool(light.GetNormalizeAttr().Get(time))
+
+
+def rect_area(width: float, height: float, matrix: np.ndarray) -> float:
+    """World-space area of a rectangle in the local XY plane."""
+    return float(np.linalg.norm(np.cross(matrix[:3, 0] * width, matrix[:3, 1] * height)))
+
+
+def disk_area(radius: float, matrix: np.ndarray) -> float:
+    """World-space area of a disk in the local XY plane; stretched, it is an ellipse."""
+    return math.pi * radius**2 * rect_area(1.0, 1.0, matrix)
+
+
+def sphere_area(radius: float, matrix: np.ndarray) -> float:
+    """World-space area of a sphere; stretched, it is an ellipsoid.
+
+    A patch dA with normal n becomes |det M| |M^-T n| dA (Nanson), integrated over the sphere.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_ALONG)
+    angles = np.arange(_AROUND) * (2 * math.pi / _AROUND)
+    ring = np.sqrt(1 - nodes**2)
+    normals = np.stack(
+        [
+            ring[:, None] * np.cos(angles),
+            ring[:, None] * np.sin(angles),
+            np.broadcast_to(nodes[:, None], (_ALONG, _AROUND)),
+        ],
+        axis=-1,
+    )
+    linear = matrix[:3, :3]
+    stretch = np.linalg.norm(normals @ _cofactor(linear).T, axis=-1).mean(axis=1)
+    return float(2 * math.pi * radius**2 * (weights * stretch).sum())
+
+
+def cylinder_area(radius: float, length: float, matrix: np.ndarray) -> float:
+    """World-space area of a cylinder around local X, without its caps."""
+    angles = np.arange(_AROUND) * (2 * math.pi / _AROUND)
+    tangents = np.stack([np.zeros(_AROUND), -np.sin(angles), np.cos(angles)], axis=-1)
+    linear = matrix[:3, :3]
+    patches = np.cross(linear[:, 0], tangents @ linear.T)
+    return float(2 * math.pi * radius * length * np.linalg.norm(patches, axis=1).mean())
+
+
+def _cofactor(linear: np.ndarray) -> np.ndarray:
+    """The matrix that turns area vectors: its columns are the cross products of the others."""
+    x, y, z = linear.T
+    return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
+
+
+class Lights:
+    """Adds lights to the scene.
+
+    Args:
+        gain: factor on every radiance, the camera's exposure.
+        z_up: the stage's up axis is Z.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        textures: Textures,
+        time: Usd.TimeCode,
+        report: Report,
+        gain: float,
+        z_up: bool,
+    ) -> None:
+        self._scene = scene
+        self._textures = textures
+        self._time = time
+        self._report = report
+        self._gain = gain
+        self._z_up = z_up
+        self.count = 0
+
+    def add(self, prim: Usd.Prim, transforms: np.ndarray) -> None:
+        """Adds a light, once for each transformation."""
+        kind = prim.GetTypeName()
+        make = {
+            "RectLight": self._rect,
+            "DiskLight": self._disk,
+            "SphereLight": self._sphere,
+            "CylinderLight": self._cylinder,
+            "DistantLight": self._distant,
+            "DomeLight": self._dome,
+            "DomeLight_1": self._dome,
+        }.get(kind)
+        if make is None:
+            what = "a portal: the dome is sampled without it" if kind == "PortalLight" else kind
+            self._report.unsupported(prim, what, "left out")
+            return
+        light = UsdLux.LightAPI(prim)
+        self.check(prim)
+        level = self._gain * radiance(light, self._time)
+        if not np.isfinite(level).all() or (level < 0).any():
+            self._report.warning(prim, "a radiance that is negative or not finite", "left out")
+            return
+        if not level.any():
+            self._report.left_out(prim, "a light of intensity or colour 0")
+            return
+        shape = self._shape_keys(prim)
+        usable = is_invertible(transforms) if kind not in ("DomeLight", "DomeLight_1") else None
+        for number, matrix in enumerate(transforms):
+            if usable is not None and not usable[number]:
+                self._report.left_out(prim, "a light scaled to nothing")
+                continue
+            description = make(prim, light, level, matrix)
+            if description is None:
+                continue
+            if kind not in ("DistantLight", "DomeLight", "DomeLight_1"):
+                description.update(shape)
+            name = str(prim.GetPath()) + (f"[{number}]" if len(transforms) > 1 else "")
+            self._scene.add_light(name, description)
+            self.count += 1
+
+    def check(self, prim: Usd.Prim) -> None:
+        """Reports what a light asks for and does not get."""
+        light, time, report = UsdLux.LightAPI(prim), self._time, self._report
+        for name, attribute in (
+            ("diffuse", light.GetDiffuseAttr()),
+            ("specular", light.GetSpecularAttr()),
+        ):
+            factor = attribute.Get(time)
+            if factor is not None and factor != 1:
+                report.unsupported(
+                    prim, f"the {name} multiplier {factor:g} of a light", "1 is used"
+                )
+        for name, collection in (
+            ("light linking", light.GetLightLinkCollectionAPI()),
+            ("shadow linking", light.GetShadowLinkCollectionAPI()),
+        ):
+            root = collection.GetIncludeRootAttr().Get(time)
+            if root is False or collection.GetExcludesRel().GetTargets():
+                report.unsupported(prim, name, "the light shines on everything")
+        if light.GetFiltersRel().GetTargets():
+            report.unsupported(prim, "light filters", "they are ignored")
+        for connected in light.GetInputs():
+            if connected.HasConnectedSource():
+                report.unsupported(
+                    prim, f"a texture on a light's {connected.GetBaseName()}", "its value is used"
+                )
+        if prim.HasAPI(UsdLux.ShadowAPI):
+            shadow = UsdLux.ShadowAPI(prim)
+            color = shadow.GetShadowColorAttr().Get(time)
+            if (
+                shadow.GetShadowEnableAttr().Get(time) is False
+                or (color is not None and any(color))
+                or (shadow.GetShadowDistanceAttr().Get(time) or -1) > 0
+            ):
+                report.unsupported(prim, "a light without true shadows", "its shadows are true")
+
+    def _normalized(self, light: UsdLux.LightAPI, level: np.ndarray, area: float) -> np.ndarray:
+        return level / area if is_normalized(light, self._time) and area > 0 else level
+
+    def _get(self, prim: Usd.Prim, name: str) -> Any:
+        return prim.GetAttribute(name).Get(self._time)
+
+    def _rect(
+        self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
+    ) -> dict[str, Any] | None:
+        width = float(self._get(prim, "inputs:width"))
+        height = float(self._get(prim, "inputs:height"))
+        area = rect_area(width, height, matrix)
+        if not area > 0:
+            return self._no_area(prim)
+        description = {
+            "type": "rect",
+            "width": width,
+            "height": height,
+            "radiance": list(self._normalized(light, level, area)),
+            "transform": flat(matrix),
+        }
+        image = self._textures.light_image(prim.GetAttribute("inputs:texture:file"))
+        if image is not None:
+            description["image"] = image
+        return description
+
+    def _disk(
+        self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
+    ) -> dict[str, Any] | None:
+        radius = float(self._get(prim, "inputs:radius"))
+        area = disk_area(radius, matrix)
+        if not area > 0:
+            return self._no_area(prim)
+        return {
+            "type": "disk",
+            "radius": radius,
+            "radiance": list(self._normalized(light, level, area)),
+            "transform": flat(matrix),
+        }
+
+    def _sphere(
+        self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
+    ) -> dict[str, Any] | None:
+        radius = float(self._get(prim, "inputs:radius"))
+        area = sphere_area(radius, matrix)
+        normalized = is_normalized(light, self._time)
+        if self._get(prim, "treatAsPoint") or not area > 0:
+            # A convex body of radiance L and area A has L A / 4 of intensity on average over the
+            # directions (Cauchy); normalised, A cancels.
+            intensity = level / 4 * (1.0 if normalized else area)
+            if not intensity.any():
+                return self._no_area(prim)
+            return {"type": "point", "intensity": list(intensity), "transform": flat(matrix)}
+        return {
+            "type": "sphere",
+            "radius": radius,
+            "radiance": list(self._normalized(light, level, area)),
+            "transform": flat(matrix),
+        }
+
+    def _cylinder(
+        self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
+    ) -> dict[str, Any] | None:
+        radius = float(self._get(prim, "inputs:radius"))
+        length = float(self._get(prim, "inputs:length"))
+        if not radius > 0 and length > 0 and is_normalized(light, self._time):
+            radius = length * 1e-3
+            self._report.unsupported(prim, "a line light", f"a cylinder of radius {radius:g}")
+        area = cylinder_area(radius, length, matrix)
+        if not area > 0:
+            return self._no_area(prim)
+        return {
+            "type": "cylinder",
+            "radius": radius,
+            "length": length,
+            "radiance": list(self._normalized(light, level, area)),
+            "transform": flat(matrix),
+        }
+
+    def _distant(
+        self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
+    ) -> dict[str, Any] | None:
+        degrees = float(np.clip(self._get(prim, "inputs:angle"), 0, 360))
+        angle = math.radians(degrees)
+        if angle > math.pi:
+            angle = math.pi
+            self._report.unsupported(
+                prim, f"a DistantLight of {degrees:g} degrees", "180 degrees are used"
+            )
+        # A parallel light has no radiance; UsdLux reads its value as irradiance either way.
+        parallel = angle == 0 or is_normalized(light, self._time)
+        return {
+            "type": "distant",
+            "angle": angle,
+            "irradiance" if parallel else "radiance": list(level),
+            "transform": flat(without_scale(matrix)[0]),
+        }
+
+    def _dome(
+        self, prim: Usd.Prim, _light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
+    ) -> dict[str, Any] | None:
+        if UsdLux.DomeLight(prim) and prim.GetRelationship("portals").GetTargets():
+            self._report.unsupported(prim, "portals", "the dome is sampled without them")
+        layout = self._get(prim, "inputs:texture:format")
+        file = prim.GetAttribute("inputs:texture:file")
+        image = self._textures.light_image(file)
+        if image is not None and layout not in ("automatic", "latlong"):
+            self._report.unsupported(prim, f"the dome format '{layout}'", "read as latlong")
+        axis = self._get(prim, "poleAxis") if prim.GetTypeName() == "DomeLight_1" else "Y"
+        orientation = without_scale(matrix)[0]
+        if axis == "Z" or (axis == "scene" and self._z_up):
+            orientation = orientation @ _POLE_TO_Z
+        orientation[:3, 3] = 0
+        description = {"type": "dome", "radiance": list(level), "transform": flat(orientation)}
+        if image is not None:
+            description["image"] = image
+        return description
+
+    def _no_area(self, prim: Usd.Prim) -> None:
+        self._report.left_out(prim, "a light without area")
+
+    def _shape_keys(self, prim: Usd.Prim) -> dict[str, Any]:
+        """The ABI's `shaping` of a light with UsdLuxShapingAPI."""
+        if not prim.HasAPI(UsdLux.ShapingAPI):
+            return {}
+        shaping, time = UsdLux.ShapingAPI(prim), self._time
+        file = shaping.GetShapingIesFileAttr().Get(time)
+        if file and file.path:
+            self._report.unsupported(prim, f"the IES profile {file.path}", "it is ignored")
+        angle = min(max(float(shaping.GetShapingConeAngleAttr().Get(time)), 0.0), 180.0)
+        softness = min(max(float(shaping.GetShapingConeSoftnessAttr().Get(time)), 0.0), 1.0)
+        focus = max(float(shaping.GetShapingFocusAttr().Get(time)), 0.0)
+        tint = [float(v) for v in shaping.GetShapingFocusTintAttr().Get(time)]
+        flat_light = prim.GetTypeName() in ("RectLight", "DiskLight")
+        if focus == 0 and (angle == 180 or (angle >= 90 and flat_light and softness == 0)):
+            return {}
+        return {
+            "shaping": {
+                "cone_angle": math.radians(angle),
+                "cone_softness": softness,
+                "focus": focus,
+                "focus_tint": tint,
+            }
+        }
+
+
+def stage_is_z_up(stage: Usd.Stage) -> bool:
+    """Whether the stage's up axis is Z. An unknown axis counts as the fallback, Y."""
+    try:
+        return UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
+    except Tf.ErrorException:
+        return False

@@ -1,0 +1,179 @@
+"""Importing a stage: everything that one frame of it shows, into a scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import SegueError
+from ..scene import Scene
+from ._pxr import Tf, Usd, UsdGeom
+from .camera import Frame, exposure_scale, find_camera, framing_camera, read_camera, read_settings
+from .geometry import Geometry, geometry_light_targets
+from .light import Lights, stage_is_z_up
+from .material import Materials
+from .report import Report
+from .texture import Textures
+from .walk import Walker, is_light
+
+
+class StageError(SegueError, ValueError):
+    """A stage could not be opened, or has not what was asked of it."""
+
+
+@dataclass
+class Imported:
+    """What came of a stage.
+
+    Attributes:
+        scene: ready to be rendered.
+        camera: path of the camera used, or a word for one that was made up.
+        resolution: width and height of the picture.
+        crop: part of it to render, in pixels from the top left, or None.
+        frame: time code that was read, or None for the stage's default.
+        report: what could not be taken as it stands.
+        counts: prims drawn and hidden.
+    """
+
+    scene: Scene
+    camera: str
+    resolution: tuple[int, int]
+    crop: tuple[int, int, int, int] | None
+    frame: float | None
+    report: Report
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def settings(self) -> dict[str, Any]:
+        """The render settings that follow from the stage."""
+        result: dict[str, Any] = {"resolution": list(self.resolution)}
+        if self.crop is not None:
+            result["crop"] = list(self.crop)
+        return result
+
+
+def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
+    """Opens a stage with all its payloads.
+
+    Raises:
+        StageError: it does not exist or is not USD.
+    """
+    name = os.fspath(path)
+    if not os.path.exists(name):
+        raise StageError(f"{name} does not exist")
+    try:
+        stage = Usd.Stage.Open(name)
+    except Tf.ErrorException as error:
+        reasons = "; ".join(" ".join(str(e.commentary).split()) for e in error.args)
+        raise StageError(f"{name} cannot be opened as USD: {reasons}") from None
+    if not stage:
+        raise StageError(f"{name} cannot be opened as USD")
+    return stage
+
+
+def load(
+    path_or_stage: str | os.PathLike[str] | Usd.Stage,
+    *,
+    frame: float | None = None,
+    camera: str | None = None,
+    purposes: Iterable[str] = ("default", "render"),
+    resolution: tuple[int, int] | None = None,
+    scene: Scene | None = None,
+) -> Imported:
+    """Imports a stage.
+
+    Nothing is rescaled: lengths stay in the stage's units and radiance in UsdLux's, whatever
+    `metersPerUnit` says.
+
+    Args:
+        path_or_stage: a file, or a stage that is open.
+        frame: time code; None: the stage's start, or the earliest values where it names none.
+        camera: path or name of a camera prim; None: the render settings' one, else the first.
+        purposes: UsdGeom purposes to draw.
+        resolution: width and height; None: the render settings' ones, else 1280 pixels wide.
+        scene: scene to add to; None: a new one.
+
+    Raises:
+        StageError: the stage cannot be opened, or the camera does not exist.
+    """
+    is_path = isinstance(path_or_stage, (str, os.PathLike))
+    stage = open_stage(path_or_stage) if is_path else path_or_stage
+    time = _time(stage, frame)
+    report = Report()
+    _report_composition(stage, report)
+    purposes = tuple(purposes)
+    target = Scene() if scene is None else scene
+
+    settings = read_settings(stage, time, report)
+    try:
+        camera_prim = find_camera(stage, camera or "", settings, report)
+    except LookupError as error:
+        raise StageError(error.args[0]) from None
+    z_up = stage_is_z_up(stage)
+    # Light transport is linear: a camera's exposure is a factor on all that emits.
+    gain = exposure_scale(UsdGeom.Camera(camera_prim), time) if camera_prim else 1.0
+    shot = (
+        read_camera(camera_prim, time, settings, resolution, report)
+        if camera_prim
+        else framing_camera(stage, time, purposes, settings, resolution, z_up)
+    )
+    if camera_prim is None:
+        report.note("", "the stage has no camera", "one was made that sees all of it")
+    target.set_camera(shot.name, shot.camera)
+
+    counts = _fill(target, stage, time, purposes, report, gain, z_up)
+    value = None if time.IsDefault() or time.IsEarliestTime() else time.GetValue()
+    return Imported(target, shot.name, shot.resolution, shot.crop, value, report, counts)
+
+
+def _fill(
+    scene: Scene,
+    stage: Usd.Stage,
+    time: Usd.TimeCode,
+    purposes: tuple[str, ...],
+    report: Report,
+    gain: float,
+    z_up: bool,
+) -> dict[str, int]:
+    """Adds the stage's lights and geometry; returns how many of what."""
+    textures = Textures(scene, time, report)
+    materials = Materials(scene, textures, time, report)
+    lights = Lights(scene, textures, time, report, gain, z_up)
+    geometry = Geometry(scene, materials, lights, time, report, gain)
+    walker = Walker(stage, time, purposes, report)
+    items = walker.items()
+    geometry.geometry_lights = geometry_light_targets([i.prim for i in items])
+    for item in items:
+        if item.prim.GetTypeName() == "GeometryLight":
+            continue
+        if is_light(item.prim):
+            lights.add(item.prim, item.transforms)
+        else:
+            geometry.add(item)
+    for what, number in sorted(walker.hidden.items()):
+        reason = "invisible" if what == "invisible" else f"of purpose '{what}'"
+        report.left_out("", f"{number} prims that are {reason}")
+    if not lights.count and not geometry.emitters:
+        report.note("", "the stage has no light", "a white sky of radiance 1 was added")
+        scene.add_light("white sky", {"type": "dome", "radiance": [gain] * 3})
+    return {"gprims": len(items), "lights": lights.count, "emissive gprims": geometry.emitters}
+
+
+def _time(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
+    if frame is not None:
+        return Usd.TimeCode(frame)
+    if stage.HasAuthoredTimeCodeRange():
+        return Usd.TimeCode(stage.GetStartTimeCode())
+    return Usd.TimeCode.EarliestTime()
+
+
+def _report_composition(stage: Usd.Stage, report: Report) -> None:
+    """References and payloads that could not be followed."""
+    if not hasattr(stage, "GetCompositionErrors"):
+        return
+    for error in stage.GetCompositionErrors():
+        report.warning(str(getattr(error, "rootSite", "")), " ".join(str(error).split()), "ignored")
+
+
+__all__ = ["Frame", "Imported", "StageError", "load", "open_stage"]

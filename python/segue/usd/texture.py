@@ -1,0 +1,345 @@
+"""UsdUVTexture networks: images, coordinates and their transformations as textures of the ABI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import images
+from ..scene import Scene
+from ._pxr import Ar, Sdf, Usd, UsdShade
+from .report import Report
+
+#: UsdPrimvarReader_<type> whose result is a number or a colour.
+COLOR_READERS = tuple(
+    f"UsdPrimvarReader_{t}" for t in ("float", "float2", "float3", "float4", "vector", "point")
+)
+#: What is used for a picture that cannot be read and has no authored fallback.
+MISSING = (0.5, 0.5, 0.5, 1.0)
+
+Source = tuple[UsdShade.Shader, str]
+
+
+def source(shader: UsdShade.ConnectableAPI, name: str, time: Usd.TimeCode) -> Source | Any:
+    """What feeds an input: (shader, output name) if it is connected to one, else a value or None.
+
+    Connections through node graphs and materials' interfaces are followed.
+    """
+    shade_input = shader.GetInput(name)
+    if not shade_input:
+        return None
+    for attribute in shade_input.GetValueProducingAttributes():
+        if UsdShade.Output.IsOutput(attribute):
+            node = UsdShade.Shader(attribute.GetPrim())
+            if node:
+                return node, UsdShade.Output(attribute).GetBaseName()
+        else:
+            return attribute.Get(time)
+    return None
+
+
+def value(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: Any) -> Any:
+    """An input that cannot be connected to a texture: its value, or the default."""
+    found = source(shader, name, time)
+    return default if found is None or isinstance(found, tuple) else found
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Texture coordinates: a primvar's name and the affine map applied to it."""
+
+    primvar: str
+    matrix: np.ndarray
+
+    @property
+    def transform(self) -> list[float]:
+        """The ABI's six numbers."""
+        return [float(v) for v in self.matrix[:2].reshape(6)]
+
+
+@dataclass(frozen=True)
+class ImageTexture:
+    """A UsdUVTexture that was read.
+
+    Attributes:
+        id: the texture.
+        coordinates: its primvar, which the mesh has to bring.
+        has_alpha: its alpha is not 1 everywhere.
+        constant: the value used instead of a picture that could not be read.
+    """
+
+    id: int
+    coordinates: Coordinates | None
+    has_alpha: bool
+    constant: tuple[float, float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """An image of the scene and what its file said."""
+
+    id: int
+    has_alpha: bool
+    is_8_bit: bool
+    channels: int
+    wrap: str
+
+
+class Textures:
+    """Loads each picture once for each way it is decoded, and makes a texture for each node."""
+
+    def __init__(self, scene: Scene, time: Usd.TimeCode, report: Report) -> None:
+        self._scene = scene
+        self._time = time
+        self._report = report
+        self._images: dict[tuple, _Loaded | str] = {}
+        self._textures: dict[tuple, ImageTexture] = {}
+
+    def uv_texture(
+        self,
+        shader: UsdShade.Shader,
+        normal_map: bool = False,
+        threshold: float | None = None,
+        channel: str = "",
+    ) -> ImageTexture:
+        """The texture of a UsdUVTexture node.
+
+        Args:
+            shader: the node.
+            normal_map: it feeds a normal, where an 8-bit picture needs scale 2 and bias -1.
+            threshold: the picture's `channel` becomes 1 where its scaled value reaches this and 0
+                elsewhere: a mask.
+            channel: that channel.
+        """
+        key = (shader.GetPath(), normal_map, threshold, channel)
+        if key not in self._textures:
+            self._textures[key] = self._uv_texture(shader, normal_map, threshold, channel)
+        return self._textures[key]
+
+    def attribute(self, shader: UsdShade.Shader) -> tuple[int, str] | None:
+        """A primvar reader as a texture, and the primvar's name."""
+        name = self._primvar_name(shader)
+        if not name:
+            return None
+        fallback = value(shader, "fallback", self._time, None)
+        numbers = [0.0] * 3 if fallback is None else np.atleast_1d(np.asarray(fallback, float))
+        numbers = [float(v) for v in numbers]
+        if len(numbers) == 1:
+            numbers *= 3
+        numbers = (numbers + [0.0] * 3)[:3] + ([numbers[3]] if len(numbers) > 3 else [1.0])
+        texture = self._scene.add_texture(
+            str(shader.GetPath()), {"type": "attribute", "name": name, "default": numbers}
+        )
+        return texture, name
+
+    def light_image(self, attribute: Usd.Attribute) -> int | None:
+        """The image of a light's texture, or None, with a warning, if it cannot be read."""
+        asset = attribute.Get(self._time) if attribute else None
+        if not asset or not asset.path:
+            return None
+        loaded = self._load(attribute, asset, "auto")
+        if isinstance(loaded, str):
+            self._report.warning(attribute.GetPrim(), loaded, "the light is plain")
+            return None
+        return loaded.id
+
+    def _uv_texture(
+        self, shader: UsdShade.Shader, normal_map: bool, threshold: float | None, channel: str
+    ) -> ImageTexture:
+        prim, time = shader.GetPrim(), self._time
+        scale = [float(v) for v in value(shader, "scale", time, (1, 1, 1, 1))]
+        bias = [float(v) for v in value(shader, "bias", time, (0, 0, 0, 0))]
+        file_attribute = self._producer(shader, "file")
+        asset = file_attribute.Get(time) if file_attribute else None
+        space = str(value(shader, "sourceColorSpace", time, "auto"))
+        mask = None if threshold is None else (channel, scale, bias, threshold)
+        loaded: _Loaded | str = "a UsdUVTexture without a file"
+        if asset and asset.path:
+            loaded = self._load(file_attribute, asset, space, mask)
+        if isinstance(loaded, str):
+            fallback = value(shader, "fallback", time, None)
+            numbers = MISSING if fallback is None else tuple(float(v) for v in fallback)
+            word = "its fallback value is used" if fallback is not None else "grey 0.5 is used"
+            self._report.warning(prim, loaded, word)
+            texture = self._scene.add_texture(
+                str(prim.GetPath()), {"type": "constant", "value": list(numbers)}
+            )
+            return ImageTexture(texture, None, numbers[3] != 1, numbers)
+        if mask is not None:
+            scale, bias = [1.0] * 4, [0.0] * 4
+        elif normal_map and loaded.is_8_bit and scale[:3] == [1, 1, 1] and bias[:3] == [0, 0, 0]:
+            self._report.warning(
+                prim,
+                "an 8-bit normal map without scale 2 and bias -1, which UsdPreviewSurface asks for",
+                "they are applied",
+            )
+            scale, bias = [2.0, 2.0, 2.0, 1.0], [-1.0, -1.0, -1.0, 0.0]
+        coordinates = self._coordinates(shader)
+        wraps = loaded.wrap.split(",") if loaded.wrap else []
+        texture = {
+            "type": "image",
+            "image": loaded.id,
+            "uv": coordinates.primvar,
+            "transform": coordinates.transform,
+            "wrap_s": self._wrap(shader, "wrapS", wraps[0] if wraps else ""),
+            "wrap_t": self._wrap(shader, "wrapT", wraps[-1] if wraps else ""),
+            "scale": scale,
+            "bias": bias,
+        }
+        if mask is not None:
+            texture["filter"] = "closest"
+        number = self._scene.add_texture(str(prim.GetPath()), texture)
+        return ImageTexture(number, coordinates, loaded.has_alpha or scale[3] + bias[3] != 1)
+
+    def _producer(self, shader: UsdShade.Shader, name: str) -> Usd.Attribute | None:
+        """The attribute that holds an input's value: its own, or a material's interface input."""
+        shade_input = shader.GetInput(name)
+        found = shade_input.GetValueProducingAttributes() if shade_input else []
+        return found[0] if found else None
+
+    def _wrap(self, shader: UsdShade.Shader, name: str, metadata: str) -> str:
+        mode = str(value(shader, name, self._time, "useMetadata"))
+        if mode == "useMetadata":
+            # UsdUVTexture: the file's own mode, and black where the file has none.
+            mode = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror"}.get(
+                metadata, "black"
+            )
+        if mode not in ("repeat", "clamp", "mirror", "black"):
+            self._report.warning(shader.GetPrim(), f"{name} '{mode}' is unknown", "black is used")
+            mode = "black"
+        return mode
+
+    def _coordinates(self, shader: UsdShade.Shader) -> Coordinates:
+        """Follows `st` through UsdTransform2d nodes to the primvar."""
+        matrix = np.eye(3)
+        name, node = "st", shader
+        while True:
+            found = source(node, name, self._time)
+            if not isinstance(found, tuple):
+                if found is not None and node.GetInput(name).GetAttr().HasAuthoredValue():
+                    # A constant coordinate: every point sees the same texel.
+                    constant = matrix @ np.array([float(found[0]), float(found[1]), 1.0])
+                    matrix = np.zeros((3, 3))
+                    matrix[:, 2] = constant
+                else:
+                    self._report.warning(
+                        shader.GetPrim(),
+                        "a UsdUVTexture without texture coordinates",
+                        "the primvar 'st' is used",
+                    )
+                return Coordinates("st", matrix)
+            node = found[0]
+            kind = node.GetIdAttr().Get()
+            if kind == "UsdTransform2d":
+                matrix = matrix @ self._transform_2d(node)
+                name = "in"
+            elif kind and kind.startswith("UsdPrimvarReader_float2"):
+                return Coordinates(self._primvar_name(node) or "st", matrix)
+            else:
+                self._report.unsupported(
+                    node.GetPrim(), f"texture coordinates from '{kind}'", "the primvar 'st' is used"
+                )
+                return Coordinates("st", matrix)
+
+    def _transform_2d(self, node: UsdShade.Shader) -> np.ndarray:
+        """UsdTransform2d: scaled, then turned counter-clockwise, then moved."""
+        turn = math.radians(float(value(node, "rotation", self._time, 0.0)))
+        scale = value(node, "scale", self._time, (1, 1))
+        move = value(node, "translation", self._time, (0, 0))
+        c, s = math.cos(turn), math.sin(turn)
+        sx, sy = float(scale[0]), float(scale[1])
+        return np.array(
+            [[c * sx, -s * sy, float(move[0])], [s * sx, c * sy, float(move[1])], [0, 0, 1]]
+        )
+
+    def _primvar_name(self, node: UsdShade.Shader) -> str:
+        name = value(node, "varname", self._time, "")
+        return str(name).removeprefix("primvars:") if name else ""
+
+    def _load(
+        self, attribute: Usd.Attribute, asset: Sdf.AssetPath, space: str, mask: Any = None
+    ) -> _Loaded | str:
+        """The image of an asset, or what is wrong with it."""
+        path = asset.resolvedPath
+        if "<UDIM>" in asset.path:
+            path = self._first_tile(attribute, asset)
+            self._report.unsupported(
+                attribute.GetPrim(),
+                f"the UDIM texture {asset.path}",
+                "its tile 1001 is used everywhere" if path else "it is taken as missing",
+            )
+        if not path:
+            return f"the file {asset.path} does not exist"
+        key = (path, space, None if mask is None else repr(mask))
+        if key not in self._images:
+            try:
+                self._images[key] = self._add_image(path, space, mask)
+            except images.ImageError as error:
+                text = " ".join(str(error).split())
+                self._images[key] = f"the file {asset.path} cannot be read ({text})"
+        return self._images[key]
+
+    def _add_image(self, path: str, space: str, mask: Any) -> _Loaded:
+        picture = images.read(path)
+        pixels = picture.pixels
+        colorspace = _colorspace(picture, space)
+        if mask is not None:
+            pixels, colorspace = _thresholded(pixels, colorspace, *mask), "raw"
+        number = self._scene.add_image(path, pixels, colorspace)
+        return _Loaded(
+            number, picture.has_alpha, picture.is_8_bit, picture.pixels.shape[2], picture.wrap
+        )
+
+    def _first_tile(self, attribute: Usd.Attribute, asset: Sdf.AssetPath) -> str:
+        relative = asset.path.replace("<UDIM>", "1001")
+        for spec in attribute.GetPropertyStack(Usd.TimeCode.Default()):
+            anchored = spec.layer.ComputeAbsolutePath(relative)
+            resolved = Ar.GetResolver().Resolve(anchored)
+            if resolved:
+                return str(resolved.GetPathString())
+        return ""
+
+
+def _colorspace(picture: images.Picture, space: str) -> str:
+    """UsdUVTexture's `sourceColorSpace` as the ABI's colour space.
+
+    "auto": what the file says of itself; else sRGB for 8 bits with 3 or 4 channels, else raw.
+    """
+    if space == "sRGB":
+        return "srgb"
+    if space == "raw":
+        return "raw"
+    channels = picture.pixels.shape[2]
+    if picture.is_8_bit:
+        return "srgb" if channels >= 3 or "srgb" in picture.colorspace.lower() else "raw"
+    return "raw"
+
+
+def _thresholded(
+    pixels: np.ndarray,
+    colorspace: str,
+    channel: str,
+    scale: list[float],
+    bias: list[float],
+    threshold: float,
+) -> np.ndarray:
+    """One channel as a mask: 255 where its scaled and biased value reaches the threshold."""
+    count = pixels.shape[2]
+    component = {"r": 0, "g": 1, "b": 2, "a": 3, "rgb": 0}[channel]
+    if component == 3:
+        position = count - 1 if count in (2, 4) else None
+    else:
+        position = component if count >= 3 else 0
+    if position is None:
+        values = np.ones(pixels.shape[:2])
+    else:
+        values = pixels[:, :, position].astype(np.float64)
+        if pixels.dtype.kind == "u":
+            values /= np.iinfo(pixels.dtype).max
+        if colorspace == "srgb" and component != 3:
+            values = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    values = values * scale[component] + bias[component]
+    return np.where(values >= threshold, np.uint8(255), np.uint8(0))

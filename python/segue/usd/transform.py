@@ -1,0 +1,53 @@
+"""Matrices: from USD's row vectors to the ABI's column vectors, in double precision."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ._pxr import Gf
+
+
+def column_matrix(matrix: Gf.Matrix4d) -> np.ndarray:
+    """A USD matrix as a (4, 4) float64 array for column vectors."""
+    return np.array(matrix, dtype=np.float64).T.copy()
+
+
+def flat(matrix: np.ndarray) -> list[float]:
+    """A (4, 4) matrix as the ABI's 16 numbers, row by row."""
+    return [float(v) for v in matrix.reshape(16)]
+
+
+def compose(outer: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """All products of (m, 4, 4) outer and (n, 4, 4) inner matrices: (m n, 4, 4), outer major."""
+    return (outer[:, None] @ inner[None]).reshape(-1, 4, 4)
+
+
+def without_scale(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rigid part of a matrix and the lengths of its axes.
+
+    The rotation is the orthogonal factor of the polar decomposition, the rotation closest to the
+    matrix (Higham 1986); a mirroring stays in it.
+    """
+    linear = matrix[:3, :3]
+    lengths = np.linalg.norm(linear, axis=0)
+    if not np.all(np.isfinite(linear)) or np.any(lengths == 0):
+        return np.eye(4), lengths
+    u, _, vt = np.linalg.svd(linear)
+    rigid = matrix.copy()
+    rigid[:3, :3] = u @ vt
+    return rigid, lengths
+
+
+def is_invertible(matrices: np.ndarray) -> np.ndarray:
+    """Which of (n, 4, 4) matrices have a finite, nonzero determinant."""
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    result = np.zeros(len(matrices), bool)
+    result[finite] = np.linalg.det(matrices[finite, :3, :3]) != 0
+    return result
+
+
+def local_matrix(xformable: Any, time: Any) -> tuple[Gf.Matrix4d, bool]:
+    """A prim's own transformation, and whether it resets the stack."""
+    return xformable.GetLocalTransformation(time), xformable.GetResetXformStack()

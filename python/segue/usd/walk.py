@@ -1,0 +1,212 @@
+"""The walk over a stage: which prims are drawn, and with which transformations.
+
+Instanceable prims and point instancers are walked once for each prototype; their instances only
+multiply the transformations of what was found there, so that they stay true instances however
+deeply they are nested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ._pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
+from .instancer import instance_transforms
+from .report import Report
+from .transform import column_matrix, compose, local_matrix
+
+_IDENTITY = np.eye(4)[None]
+
+
+@dataclass(frozen=True)
+class Item:
+    """A drawn prim, or one in a prototype, and where it stands.
+
+    Attributes:
+        prim: the prim; inside an instance, the proxy below the first instance that is alike.
+        transforms: (n, 4, 4) float64, to the space of the prototype (of the world, at the end).
+        absolute: the prim resets the transformation stack, so an instance does not move it.
+    """
+
+    prim: Usd.Prim
+    transforms: np.ndarray
+    absolute: bool = False
+
+    def placed(self, outer: np.ndarray) -> Item:
+        """The item below instances with the given transformations."""
+        if self.absolute:
+            return self
+        return Item(self.prim, compose(outer, self.transforms), False)
+
+
+@dataclass(frozen=True)
+class _State:
+    """What a prim inherits: transformation up to the nearest instance, and purpose."""
+
+    matrix: Gf.Matrix4d
+    absolute: bool = False
+    purpose: str = "default"
+    purpose_inherits: bool = False
+
+
+class Walker:
+    """Finds the drawn prims of a stage at one time."""
+
+    def __init__(
+        self, stage: Usd.Stage, time: Usd.TimeCode, purposes: Iterable[str], report: Report
+    ) -> None:
+        self._stage = stage
+        self._time = time
+        self._purposes = frozenset(purposes)
+        self._report = report
+        self._prototypes: dict[tuple, list[Item]] = {}
+        self._inherited: dict[Any, tuple] = {}
+        self._open: list[Any] = []
+        self._hidden: dict[str, int] = {}
+
+    def items(self) -> list[Item]:
+        """The drawn prims, each once, with all its transformations, in stage order."""
+        found: list[Item] = []
+        predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+        root = self._stage.GetPseudoRoot()
+        for prim in root.GetFilteredChildren(predicate):
+            self._visit(prim, _State(Gf.Matrix4d(1)), predicate, found)
+        merged: dict[tuple, list[Item]] = {}
+        for item in found:
+            merged.setdefault((item.prim.GetPath(), item.absolute), []).append(item)
+        return [
+            Item(same[0].prim, np.concatenate([i.transforms for i in same]), same[0].absolute)
+            for same in merged.values()
+        ]
+
+    @property
+    def hidden(self) -> dict[str, int]:
+        """How many subtrees or prims were not drawn: by purpose, and "invisible"."""
+        return self._hidden
+
+    def _visit(self, prim: Usd.Prim, state: _State, predicate: Any, found: list[Item]) -> None:
+        imageable = UsdGeom.Imageable(prim)
+        if imageable:
+            if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
+                self._hidden["invisible"] = self._hidden.get("invisible", 0) + 1
+                return
+            state = self._with_purpose(imageable, state)
+        xformable = UsdGeom.Xformable(prim)
+        if xformable:
+            own, reset = local_matrix(xformable, self._time)
+            matrix = own if reset else own * state.matrix
+            state = _State(matrix, reset or state.absolute, state.purpose, state.purpose_inherits)
+        if prim.IsInstance():
+            self._instance(prim, state, predicate, found)
+            return
+        if prim.IsA(UsdGeom.PointInstancer):
+            if self._is_drawn(state):
+                self._point_instancer(prim, state, found)
+            return
+        if _is_drawable(prim) and self._is_drawn(state):
+            found.append(Item(prim, column_matrix(state.matrix)[None], state.absolute))
+        for child in prim.GetFilteredChildren(predicate):
+            self._visit(child, state, predicate, found)
+
+    def _with_purpose(self, imageable: UsdGeom.Imageable, state: _State) -> _State:
+        """UsdGeomImageable's rule: an authored purpose holds for the prim and what is below."""
+        attribute = imageable.GetPurposeAttr()
+        if attribute.HasAuthoredValue():
+            return _State(state.matrix, state.absolute, attribute.Get(), True)
+        if not state.purpose_inherits and state.purpose != "default":
+            return _State(state.matrix, state.absolute, "default", False)
+        return state
+
+    def _is_drawn(self, state: _State) -> bool:
+        if state.purpose in self._purposes:
+            return True
+        self._hidden[state.purpose] = self._hidden.get(state.purpose, 0) + 1
+        return False
+
+    def _instance(self, prim: Usd.Prim, state: _State, predicate: Any, found: list[Item]) -> None:
+        key = (
+            prim.GetPrototype().GetPath(),
+            state.purpose,
+            state.purpose_inherits,
+            self._inherited_by(prim),
+        )
+        items = self._prototypes.get(key)
+        if items is None:
+            items = []
+            inner = _State(Gf.Matrix4d(1), False, state.purpose, state.purpose_inherits)
+            for child in prim.GetFilteredChildren(predicate):
+                self._visit(child, inner, predicate, items)
+            self._prototypes[key] = items
+        self._place(items, column_matrix(state.matrix)[None], state.absolute, found)
+
+    def _inherited_by(self, prim: Usd.Prim) -> tuple:
+        """What the prims of an instance may inherit from above it: bindings and primvars.
+
+        Instances for which this is the same share what was found in the first of them.
+        """
+        path = prim.GetPath()
+        known = self._inherited.get(path)
+        if known is not None:
+            return known
+        parent = prim.GetParent()
+        above = self._inherited_by(parent) if parent and not parent.IsPseudoRoot() else ()
+        own: list = []
+        for relationship in prim.GetAuthoredPropertiesInNamespace("material:binding"):
+            if isinstance(relationship, Usd.Relationship):
+                name = relationship.GetName()
+                strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
+                targets = tuple(relationship.GetTargets())
+                # A collection's members are given by path: no two instances are alike.
+                mark = path if ":collection:" in name else None
+                own.append((name, targets, strength, mark))
+        own.extend(
+            primvar.GetAttr().GetPath()
+            for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()
+        )
+        result = (*above, *own)
+        self._inherited[path] = result
+        return result
+
+    def _point_instancer(self, prim: Usd.Prim, state: _State, found: list[Item]) -> None:
+        groups = instance_transforms(UsdGeom.PointInstancer(prim), self._time, self._report)
+        # A prototype is drawn wherever it is defined: below an `over`, a class, or the instancer.
+        predicate = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
+        outer = column_matrix(state.matrix)[None]
+        for path, transforms in groups:
+            if path in self._open:
+                self._report.warning(
+                    prim, f"the prototype {path} holds its own instancer", "left out"
+                )
+                continue
+            root = self._stage.GetPrimAtPath(path)
+            key = (path, state.purpose, state.purpose_inherits)
+            items = self._prototypes.get(key)
+            if items is None:
+                items = []
+                inner = _State(Gf.Matrix4d(1), False, state.purpose, state.purpose_inherits)
+                self._open.append(path)
+                self._visit(root, inner, predicate, items)
+                self._open.pop()
+                # Resetting the stack inside a prototype goes no further than the prototype.
+                items = [Item(i.prim, i.transforms, False) for i in items]
+                self._prototypes[key] = items
+            self._place(items, compose(outer, transforms), state.absolute, found)
+
+    @staticmethod
+    def _place(items: list[Item], outer: np.ndarray, absolute: bool, found: list[Item]) -> None:
+        for item in items:
+            placed = item.placed(outer)
+            found.append(Item(placed.prim, placed.transforms, placed.absolute or absolute))
+
+
+def _is_drawable(prim: Usd.Prim) -> bool:
+    """Whether the prim itself is geometry or a light, rather than a group, camera or material."""
+    return prim.IsA(UsdGeom.Boundable) or prim.HasAPI(UsdLux.LightAPI) or is_light(prim)
+
+
+def is_light(prim: Usd.Prim) -> bool:
+    """Whether the prim is a light by its type, rather than geometry made one by an API schema."""
+    return prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase)
