@@ -5,5 +5,6 @@
 
 pub mod math;
 pub mod scene;
+pub mod shading;
 
 pub mod film;

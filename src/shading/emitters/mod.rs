@@ -1,0 +1,236 @@
+//! Emitters: analytic lights, domes and emissive triangles. Each can be sampled towards a receiver
+//! (next event), sampled from (light paths), met by a ray, and asked for the density of what was
+//! sampled; a set of them can be chosen from.
+
+mod bounds;
+mod cylinder;
+mod disk;
+mod distant;
+mod dome;
+mod emitter;
+mod falloff;
+mod map_sampler;
+mod plane;
+mod point;
+mod rect;
+mod sample;
+mod scene_bounds;
+mod sphere;
+mod spherical_rect;
+mod triangle;
+mod triangle_table;
+
+use crate::math::density::{DiscreteProbability, EtenduePdf, SolidAnglePdf};
+use crate::math::distribution::AliasTable;
+use crate::math::luminance;
+use crate::scene::{Image, Light, SceneError, Warnings};
+use emitter::Emitter;
+use glam::{Vec2, Vec3};
+use std::sync::Arc;
+use triangle::Triangle;
+use triangle_table::TriangleTable;
+
+pub use sample::{Emission, EmitterHit, EmitterId, FromSample, Incident, Receiver, TowardsSample};
+pub use scene_bounds::SceneBounds;
+pub use triangle::MeshTriangle;
+
+/// All that emits in a scene.
+#[derive(Debug)]
+pub struct Emitters {
+    lights: Vec<Emitter>,
+    camera_visible: Vec<bool>,
+    triangles: Vec<Triangle>,
+    table: TriangleTable,
+    infinite: Vec<EmitterId>,
+    hittable: Vec<EmitterId>,
+    by_power: Option<AliasTable>,
+    total_power: Vec3,
+    bounds: SceneBounds,
+}
+
+impl Emitters {
+    /// The emitters of a scene. Light `i` becomes emitter `i`. Triangles that cannot emit are dropped,
+    /// counted in `warnings`.
+    pub fn build(
+        lights: &[Light],
+        triangles: &[MeshTriangle],
+        images: &[Arc<Image>],
+        bounds: SceneBounds,
+        warnings: &mut Warnings,
+    ) -> Result<Self, SceneError> {
+        let camera_visible = lights.iter().map(|l| l.camera_visible).collect();
+        let lights = lights.iter().map(|l| Emitter::new(l, images)).collect::<Result<Vec<_>, _>>()?;
+        let mut places = Vec::with_capacity(triangles.len());
+        let mut kept = Vec::with_capacity(triangles.len());
+        for t in triangles {
+            if let Some(triangle) = Triangle::new(t) {
+                places.push((t.instance, t.triangle));
+                kept.push(triangle);
+            }
+        }
+        if kept.len() < triangles.len() {
+            let count = (triangles.len() - kept.len()) as u64;
+            warnings.add("emissive meshes", "triangles without area or radiance do not emit", count);
+        }
+        let ids = |keep: fn(&Emitter) -> bool| {
+            let all = lights.iter().enumerate().filter(|(_, l)| keep(l));
+            all.map(|(i, _)| EmitterId(i as u32)).collect::<Vec<_>>()
+        };
+        let (infinite, hittable) = (ids(Emitter::is_infinite), ids(Emitter::is_hittable));
+        let power = |l: &Emitter| l.power(&bounds);
+        let powers: Vec<Vec3> = lights.iter().map(power).chain(kept.iter().map(Triangle::power)).collect();
+        let table = TriangleTable::new(&places, lights.len() as u32);
+        Ok(Self {
+            by_power: AliasTable::new(powers.iter().map(|&p| luminance(p) as f64)),
+            total_power: powers.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>().as_vec3(),
+            lights,
+            camera_visible,
+            triangles: kept,
+            table,
+            infinite,
+            hittable,
+            bounds,
+        })
+    }
+
+    /// Number of emitters.
+    pub fn len(&self) -> usize {
+        self.lights.len() + self.triangles.len()
+    }
+
+    /// Whether nothing emits.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Power of all emitters, W; that of domes and distant lights is what enters the scene's sphere.
+    pub fn total_power(&self) -> Vec3 {
+        self.total_power
+    }
+
+    /// Power of one emitter, as in [`Emitters::total_power`].
+    pub fn power(&self, id: EmitterId) -> Vec3 {
+        match self.get(id) {
+            Kind::Light(l) => l.power(&self.bounds),
+            Kind::Triangle(t) => t.power(),
+        }
+    }
+
+    /// Whether camera rays see an emitter; triangles leave that to their instance.
+    pub fn camera_visible(&self, id: EmitterId) -> bool {
+        self.camera_visible.get(id.0 as usize).copied().unwrap_or(true)
+    }
+
+    /// The emitter of a mesh's triangle.
+    #[inline]
+    pub fn triangle(&self, instance: u32, triangle: u32) -> Option<EmitterId> {
+        self.table.get(instance, triangle)
+    }
+
+    /// Instance and triangle of an emitter that is one.
+    pub fn triangle_of(&self, id: EmitterId) -> Option<(u32, u32)> {
+        self.table.place(id)
+    }
+
+    fn get(&self, id: EmitterId) -> Kind<'_> {
+        let i = id.0 as usize;
+        match i < self.lights.len() {
+            true => Kind::Light(&self.lights[i]),
+            false => Kind::Triangle(&self.triangles[i - self.lights.len()]),
+        }
+    }
+
+    /// Samples light from emitter `id` towards a receiver. `None` where none arrives, or by chance for
+    /// shapes that are sampled by a larger one around them.
+    pub fn sample_towards(&self, id: EmitterId, receiver: &Receiver, u: Vec2) -> Option<TowardsSample> {
+        match self.get(id) {
+            Kind::Light(l) => l.sample_towards(receiver, u),
+            Kind::Triangle(t) => {
+                let (at, radiance, barycentrics) = t.towards(receiver.position, u)?;
+                Some(TowardsSample {
+                    barycentrics: Some(barycentrics),
+                    ..emitter::towards_surface(at, radiance)?
+                })
+            }
+        }
+    }
+
+    /// Density with which [`Emitters::sample_towards`] would have sampled what a ray from the receiver
+    /// along `direction` met.
+    pub fn pdf_towards(&self, receiver: &Receiver, direction: Vec3, hit: &EmitterHit) -> SolidAnglePdf {
+        match self.get(hit.emitter) {
+            Kind::Light(l) => l.pdf_towards(receiver, direction, hit),
+            Kind::Triangle(t) => t.pdf_towards(direction, hit.distance),
+        }
+    }
+
+    /// Samples a ray that leaves emitter `id`: `u` for its origin, `v` for its direction.
+    pub fn sample_from(&self, id: EmitterId, u: Vec2, v: Vec2) -> Option<FromSample> {
+        match self.get(id) {
+            Kind::Light(l) => l.sample_from(&self.bounds, u, v),
+            Kind::Triangle(t) => Some(t.from(u, v)),
+        }
+    }
+
+    /// Density with which [`Emitters::sample_from`] would have sampled the ray that travels *against*
+    /// `direction` and leaves the emitter where `hit` says, per étendue. Zero for emitters that no ray
+    /// can meet.
+    pub fn pdf_from(&self, direction: Vec3, hit: &EmitterHit) -> EtenduePdf {
+        match self.get(hit.emitter) {
+            Kind::Light(l) => l.pdf_from(&self.bounds, -direction, hit),
+            Kind::Triangle(t) => t.pdf_from(-direction),
+        }
+    }
+
+    /// Calls `found` for every analytic light that the ray meets nearer than `t_max`, in no particular
+    /// order. `direction` is a unit vector. Triangles and what is at infinity are not among them.
+    pub fn for_each_hit(&self, origin: Vec3, direction: Vec3, t_max: f32, mut found: impl FnMut(EmitterHit)) {
+        for &id in &self.hittable {
+            if let Some((distance, normal)) = self.lights[id.0 as usize].hit(origin, direction)
+                && distance < t_max
+            {
+                let point = origin + direction * distance;
+                let radiance = self.lights[id.0 as usize].emitted(point, -direction);
+                found(EmitterHit { emitter: id, distance, point, normal, radiance });
+            }
+        }
+    }
+
+    /// Calls `found` for every dome and every distant light of some extent that is seen along the unit
+    /// vector `direction`.
+    pub fn for_each_infinite(&self, direction: Vec3, mut found: impl FnMut(EmitterHit)) {
+        for &id in &self.infinite {
+            if let Some(radiance) = self.lights[id.0 as usize].seen(direction) {
+                let distance = f32::INFINITY;
+                found(EmitterHit { emitter: id, distance, point: Vec3::ZERO, normal: -direction, radiance });
+            }
+        }
+    }
+
+    /// Chooses an emitter for a receiver: the emitter, its probability, and `u` made uniform again.
+    pub fn select(&self, _receiver: &Receiver, u: f32) -> Option<(EmitterId, DiscreteProbability, f32)> {
+        self.select_emission(u)
+    }
+
+    /// Probability with which [`Emitters::select`] chooses an emitter.
+    pub fn probability(&self, _receiver: &Receiver, id: EmitterId) -> DiscreteProbability {
+        self.emission_probability(id)
+    }
+
+    /// Chooses an emitter in proportion to its power, to start a light path: the emitter, its
+    /// probability, and `u` made uniform again.
+    pub fn select_emission(&self, u: f32) -> Option<(EmitterId, DiscreteProbability, f32)> {
+        let (index, p, u) = self.by_power.as_ref()?.sample(u);
+        Some((EmitterId(index as u32), DiscreteProbability(p), u))
+    }
+
+    /// Probability with which [`Emitters::select_emission`] chooses an emitter.
+    pub fn emission_probability(&self, id: EmitterId) -> DiscreteProbability {
+        DiscreteProbability(self.by_power.as_ref().map_or(0.0, |t| t.probability(id.0 as usize)))
+    }
+}
+
+enum Kind<'a> {
+    Light(&'a Emitter),
+    Triangle(&'a Triangle),
+}

@@ -1,0 +1,117 @@
+//! Emissive triangles of meshes.
+
+use super::bounds::LightBounds;
+use super::sample::{Emission, FromSample, SurfacePoint};
+use crate::math::density::{AreaPdf, EtenduePdf, ProjectedPdf, SolidAnglePdf};
+use crate::math::{Frame, luminance, warp};
+use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI};
+
+/// An emissive triangle as the caller hands it over.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshTriangle {
+    /// Index of the instance it belongs to.
+    pub instance: u32,
+    /// Index of the triangle in its mesh.
+    pub triangle: u32,
+    /// Corners in world space; seen counter-clockwise from the side that emits.
+    pub vertices: [Vec3; 3],
+    /// Mean emitted radiance over the triangle.
+    pub radiance: Vec3,
+    /// Whether the other side emits alike.
+    pub two_sided: bool,
+}
+
+/// An emissive triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Triangle {
+    vertex: Vec3,
+    edges: [Vec3; 2],
+    radiance: Vec3,
+    two_sided: bool,
+}
+
+impl Triangle {
+    /// `None` where it cannot emit: no area, no radiance, or not finite.
+    pub fn new(t: &MeshTriangle) -> Option<Self> {
+        let [a, b, c] = t.vertices;
+        let edges = [b - a, c - a];
+        let area = edges[0].cross(edges[1]).length();
+        let emits = t.radiance.min_element() >= 0.0 && t.radiance.max_element() > 0.0;
+        let sound = t.radiance.is_finite() && area > 0.0 && area.is_finite() && a.is_finite();
+        (emits && sound).then_some(Self { vertex: a, edges, radiance: t.radiance, two_sided: t.two_sided })
+    }
+
+    /// Unit normal and area.
+    fn geometry(&self) -> (Vec3, f32) {
+        let n = self.edges[0].cross(self.edges[1]);
+        let length = n.length();
+        (n / length, 0.5 * length)
+    }
+
+    fn point(&self, b: Vec2) -> Vec3 {
+        self.vertex + self.edges[0] * b.x + self.edges[1] * b.y
+    }
+
+    pub fn towards(&self, x: Vec3, u: Vec2) -> Option<(SurfacePoint, Vec3, Vec2)> {
+        let (normal, area) = self.geometry();
+        let b = warp::uniform_triangle(u);
+        let point = self.point(b);
+        let facing = if self.two_sided && normal.dot(x - point) < 0.0 { -normal } else { normal };
+        let sample = SurfacePoint::by_area(x, point, facing, AreaPdf(1.0 / area))?;
+        Some((sample, self.radiance, b))
+    }
+
+    pub fn pdf_towards(&self, direction: Vec3, distance: f32) -> SolidAnglePdf {
+        let (normal, area) = self.geometry();
+        let cos = -normal.dot(direction);
+        match self.two_sided || cos > 0.0 {
+            true => AreaPdf(1.0 / area).to_solid_angle(distance, cos),
+            false => SolidAnglePdf(0.0),
+        }
+    }
+
+    pub fn from(&self, mut u: Vec2, v: Vec2) -> FromSample {
+        let (mut normal, area) = self.geometry();
+        let mut pdf = FRAC_1_PI;
+        if self.two_sided {
+            pdf *= 0.5;
+            if u.x < 0.5 {
+                normal = -normal;
+            }
+            u.x = (u.x * 2.0).fract();
+        }
+        let b = warp::uniform_triangle(u);
+        let pdf = AreaPdf(1.0 / area).with_direction(ProjectedPdf(pdf));
+        FromSample {
+            origin: self.point(b),
+            normal,
+            direction: Frame::from_normal(normal).to_world(warp::cosine_hemisphere(v)),
+            emission: Emission::Extended { radiance: self.radiance, pdf },
+            barycentrics: Some(b),
+        }
+    }
+
+    pub fn pdf_from(&self, direction: Vec3) -> EtenduePdf {
+        let (normal, area) = self.geometry();
+        let pdf = match self.two_sided {
+            true => 0.5 * FRAC_1_PI,
+            false if normal.dot(direction) > 0.0 => FRAC_1_PI,
+            false => 0.0,
+        };
+        AreaPdf(1.0 / area).with_direction(ProjectedPdf(pdf))
+    }
+
+    pub fn power(&self) -> Vec3 {
+        let sides = if self.two_sided { 2.0 } else { 1.0 };
+        self.radiance * (PI * sides * self.geometry().1)
+    }
+
+    pub fn bounds(&self) -> LightBounds {
+        let [a, b, c] = [self.vertex, self.vertex + self.edges[0], self.vertex + self.edges[1]];
+        let (normal, area) = self.geometry();
+        let intensity = luminance(self.radiance) * area;
+        let bounds = LightBounds::cone(a.min(b).min(c), a.max(b).max(c), normal, 10.0, true, intensity);
+        LightBounds { two_sided: self.two_sided, ..bounds }
+    }
+}

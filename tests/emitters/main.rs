@@ -1,0 +1,8 @@
+//! Emitters against closed forms, against quadrature, and against each other: next event, light paths
+//! and rays must agree on how much light arrives.
+
+mod chi_square;
+mod irradiance;
+mod references;
+mod scene_data;
+mod support;
