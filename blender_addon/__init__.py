@@ -1,0 +1,20 @@
+"""Segue for Blender: the render engine, its settings and its panels."""
+
+from __future__ import annotations
+
+from . import engine, library, panels, properties
+
+MODULES = (properties, engine, panels)
+
+
+def register() -> None:
+    """Register the add-on; fails with a readable reason where the engine cannot be loaded."""
+    library.load()
+    for module in MODULES:
+        module.register()
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    for module in reversed(MODULES):
+        module.unregister()

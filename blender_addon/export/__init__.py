@@ -1,0 +1,1 @@
+"""From Blender's evaluated scene to a `segue.Scene`."""

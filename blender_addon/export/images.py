@@ -1,0 +1,99 @@
+"""Blender's images as pixel arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..log import ExportLog
+
+# Colour spaces of byte images that Segue decodes; float images are scene linear already.
+_COLORSPACES = {
+    "sRGB": "srgb",
+    "Non-Color": "raw",
+    "Raw": "raw",
+    "Linear Rec.709": "linear",
+    "Linear": "linear",
+    "scene_linear": "linear",
+}
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """A picture: (height, width, 3 or 4) of uint8 or float32, row 0 on top."""
+
+    values: np.ndarray
+    colorspace: str
+
+    def linear(self) -> np.ndarray:
+        """The decoded picture as (height, width, 4) float32."""
+        values = self.values
+        if values.dtype == np.uint8:
+            values = values.astype(np.float32) / np.float32(255.0)
+        if self.colorspace == "srgb":
+            values = values.copy()
+            values[..., :3] = srgb_to_linear(values[..., :3])
+        if values.shape[2] == 3:
+            values = np.concatenate([values, np.ones_like(values[..., :1])], axis=2)
+        return values
+
+
+def srgb_to_linear(values: np.ndarray) -> np.ndarray:
+    """IEC 61966-2-1 decoding."""
+    low = values / np.float32(12.92)
+    high = ((np.maximum(values, 0.0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
+    return np.where(values <= 0.04045, low, high)
+
+
+def _colorspace(image: bpy.types.Image, log: ExportLog) -> str:
+    name = image.colorspace_settings.name
+    if image.is_float:
+        return "raw" if name in {"Non-Color", "Raw"} else "linear"
+    if name not in _COLORSPACES:
+        log.warn(f"Image '{image.name}': colour space '{name}' is not supported, it is read as sRGB")
+    return _COLORSPACES.get(name, "srgb")
+
+
+def read_image(image: bpy.types.Image, log: ExportLog, *, straight_alpha: bool) -> Pixels | None:
+    """The pixels of an image; None if they cannot be had.
+
+    With `straight_alpha` the colours are free of the alpha channel, as a shader that uses the alpha
+    wants them; otherwise they are multiplied by it, as Cycles does unless the image says not to.
+    """
+    width, height = image.size
+    if width == 0 or height == 0:
+        return None
+    if image.source == "TILED":
+        log.warn(f"Image '{image.name}': UDIM tiles are not supported, the first tile is used everywhere")
+    elif image.source in {"SEQUENCE", "MOVIE"}:
+        log.warn(f"Image '{image.name}': image sequences are not supported, the frame now loaded is used")
+    values = np.empty(4 * width * height, np.float32)
+    image.pixels.foreach_get(values)
+    values = values.reshape(height, width, 4)[::-1]
+    values = _alpha(image, values, straight_alpha)
+    if not image.is_float:
+        # Byte images come as value / 255, so this is exact.
+        values = np.rint(values * np.float32(255.0)).clip(0, 255).astype(np.uint8)
+    opaque = 255 if values.dtype == np.uint8 else 1.0
+    if (values[..., 3] == opaque).all():
+        values = values[..., :3]
+    return Pixels(np.ascontiguousarray(values), _colorspace(image, log))
+
+
+def _alpha(image: bpy.types.Image, values: np.ndarray, straight: bool) -> np.ndarray:
+    """Bring colour and alpha into the wanted relation. Byte pixels are straight, float ones not."""
+    if image.alpha_mode == "NONE":
+        values = values.copy()
+        values[..., 3] = 1.0
+        return values
+    if image.alpha_mode == "CHANNEL_PACKED":
+        return values
+    alpha = values[..., 3:]
+    if image.is_float and straight:
+        color = np.divide(values[..., :3], alpha, out=values[..., :3].copy(), where=alpha > 0)
+        return np.concatenate([color, alpha], axis=2)
+    if not image.is_float and not straight:
+        return np.concatenate([values[..., :3] * alpha, alpha], axis=2)
+    return values

@@ -1,0 +1,136 @@
+"""Evaluated meshes, in bulk."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Collection
+from typing import Any
+
+import bpy
+import numpy as np
+
+# Attribute types that a shader can read: property of an element, and its number of floats.
+_ATTRIBUTE_TYPES = {
+    "FLOAT": ("value", 1),
+    "INT": ("value", 1),
+    "INT8": ("value", 1),
+    "BOOLEAN": ("value", 1),
+    "FLOAT2": ("vector", 2),
+    "FLOAT_VECTOR": ("vector", 3),
+    "FLOAT_COLOR": ("color", 4),
+    "BYTE_COLOR": ("color", 4),
+}
+
+
+def _get(collection: Any, name: str, count: int, dtype: Any) -> np.ndarray:
+    values = np.empty(count, dtype)
+    if count:
+        collection.foreach_get(name, values)
+    return values
+
+
+def _triangle_corners(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Corner index of each triangle's corners, flat.
+
+    Blender keeps the triangles as an array of three 32-bit indices, which is read in place where
+    its first and last triangle look as expected: seven times as fast as asking for it.
+    """
+    triangles = mesh.loop_triangles
+    count = len(triangles)
+    address = triangles[0].as_pointer()
+    if triangles[count - 1].as_pointer() - address == 12 * (count - 1):
+        corners = np.ctypeslib.as_array((ctypes.c_int32 * (3 * count)).from_address(address))
+        ends = (0, count // 2, count - 1)
+        if all(tuple(corners[3 * i : 3 * i + 3]) == tuple(triangles[i].loops) for i in ends):
+            return corners.astype(np.uint32)
+    return _get(triangles, "loops", 3 * count, np.int32).astype(np.uint32)
+
+
+class MeshArrays:
+    """The arrays of one mesh, as triangles with the triangulation that Blender shows."""
+
+    def __init__(self, mesh: bpy.types.Mesh) -> None:
+        self.mesh = mesh
+        mesh.calc_loop_triangles()
+        self.triangle_count = len(mesh.loop_triangles)
+        if not self.triangle_count:
+            return
+        corner_count = len(mesh.loops)
+        self.points = _get(mesh.attributes["position"].data, "vector", 3 * len(mesh.vertices), np.float32).reshape(
+            -1, 3
+        )
+        corner_points = _get(mesh.attributes[".corner_vert"].data, "value", corner_count, np.int32)
+        self.corners = _triangle_corners(mesh)
+        self.indices = corner_points.astype(np.uint32)[self.corners]
+        self.polygons = _get(mesh.loop_triangle_polygons, "value", self.triangle_count, np.int32)
+
+    def slots(self) -> np.ndarray | None:
+        """Material slot of each triangle; None where all are 0."""
+        attribute = self.mesh.attributes.get("material_index")
+        if attribute is None or attribute.domain != "FACE" or attribute.data_type != "INT":
+            return None
+        values = _get(attribute.data, "value", len(self.mesh.polygons), np.int32)
+        if not values.any():
+            return None
+        return np.maximum(values, 0).astype(np.uint32)[self.polygons]
+
+    def normals(self) -> tuple[np.ndarray | None, str]:
+        """Shading normals and where they sit; None for flat shading."""
+        mesh = self.mesh
+        if mesh.normals_domain == "FACE":
+            return None, "face"
+        if mesh.normals_domain == "POINT":
+            values = _get(mesh.vertex_normals, "vector", 3 * len(mesh.vertices), np.float32)
+            return values.reshape(-1, 3), "vertex"
+        values = _get(mesh.corner_normals, "vector", 3 * len(mesh.loops), np.float32)
+        return values.reshape(-1, 3)[self.corners], "corner"
+
+    def uv_maps(self) -> list[tuple[str, np.ndarray]]:
+        """Every UV map as (name, values at the corners), the one rendered by default first."""
+        layers = sorted(self.mesh.uv_layers, key=lambda layer: not layer.active_render)
+        count = len(self.mesh.loops)
+        return [(layer.name, _get(layer.uv, "vector", 2 * count, np.float32).reshape(-1, 2)) for layer in layers]
+
+    def attribute(self, name: str) -> tuple[np.ndarray, str, np.ndarray | None] | None:
+        """A generic attribute as (values, interpolation, indices); None if there is none to use."""
+        attribute = self.mesh.attributes.get(name)
+        if attribute is None or attribute.data_type not in _ATTRIBUTE_TYPES:
+            return None
+        member, width = _ATTRIBUTE_TYPES[attribute.data_type]
+        dtype = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}.get(attribute.data_type, np.float32)
+        values = _get(attribute.data, member, width * len(attribute.data), dtype).astype(np.float32)
+        values = values.reshape(-1, width)
+        if width == 1:
+            values = np.repeat(values, 3, axis=1)
+        if attribute.domain == "POINT":
+            return values, "vertex", None
+        if attribute.domain == "CORNER":
+            return values, "corner", self.corners
+        if attribute.domain == "FACE":
+            return values[self.polygons], "face", None
+        return None
+
+
+def export_mesh(segue: Any, scene: Any, mesh: bpy.types.Mesh, wanted: Collection[str]) -> int | None:
+    """Add a mesh with its UV maps and the `wanted` attributes; None if it has no faces."""
+    arrays = MeshArrays(mesh)
+    if not arrays.triangle_count:
+        return None
+    normals, interpolation = arrays.normals()
+    uv_maps = arrays.uv_maps()
+    attributes = [segue.Attribute(name, values, "corner", indices=arrays.corners) for name, values in uv_maps]
+    names = {name for name, _ in uv_maps}
+    for name in sorted(set(wanted) - names):
+        found = arrays.attribute(name)
+        if found is not None:
+            values, domain, indices = found
+            attributes.append(segue.Attribute(name, values, domain, indices=indices))
+    return scene.add_mesh(
+        mesh.name,
+        arrays.points,
+        arrays.indices,
+        normals=normals,
+        normal_interpolation=interpolation,
+        face_slots=arrays.slots(),
+        attributes=attributes,
+    )

@@ -1,0 +1,67 @@
+"""The world: a dome with a colour or an environment map."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..log import ExportLog
+from ..nodes.material import Translator
+from ..nodes.values import AttributeValue, Constant, ImageValue
+
+# Columns: where the axes of the ABI's dome lie in Blender's world. Blender's map has +X in its
+# centre column, +Y a quarter to the left and +Z on top.
+_BLENDER_FROM_DOME = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def world_json(world: bpy.types.World | None, translator: Translator, log: ExportLog) -> dict[str, Any] | None:
+    """The dome light of a world; None for a black one."""
+    if world is None:
+        return None
+    if not world.use_nodes or world.node_tree is None:
+        value = Constant.color(world.color)
+    else:
+        value = translator.world_radiance(world)
+    visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
+    result: dict[str, Any] = {"type": "dome", "camera_visible": visible}
+    if isinstance(value, ImageValue):
+        image = translator.textures.image(value.source)
+        if image is None:
+            return None
+        result["radiance"] = [1.0, 1.0, 1.0]
+        result["image"] = image
+        result["transform"] = _dome_transform(world.name, value.sampling.matrix, log)
+        return result
+    assert not isinstance(value, AttributeValue)
+    if not any(value.rgb):
+        return None
+    result["radiance"] = list(value.rgb)
+    return result
+
+
+def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> list[float]:
+    """Light to world for a map that is looked up at `matrix` times the direction."""
+    lookup = np.array(matrix).reshape(3, 3)
+    # The nearest rotation or mirror: a dome cannot be stretched.
+    u, sizes, vt = np.linalg.svd(lookup)
+    if sizes[-1] <= 1e-6 * sizes[0]:
+        log.warn(f"World '{name}': the mapping of its image is flat, it is left out")
+        u, vt = np.eye(3), np.eye(3)
+    elif sizes[0] > sizes[-1] * (1.0 + 1e-4):
+        log.warn(f"World '{name}': a mapping that stretches the image is not supported, only its rotation is used")
+    transform = np.eye(4)
+    transform[:3, :3] = (u @ vt).T @ _BLENDER_FROM_DOME
+    return transform.ravel().tolist()
+
+
+def export_world(scene: Any, depsgraph: bpy.types.Depsgraph, translator: Translator, log: ExportLog) -> None:
+    """Add the world of the view layer, if it shines."""
+    view_layer = depsgraph.view_layer_eval
+    if not view_layer.use_sky:
+        return
+    world = getattr(view_layer, "world_override", None) or depsgraph.scene_eval.world
+    data = world_json(world, translator, log)
+    if data is not None:
+        scene.add_light(world.name, data)

@@ -1,0 +1,25 @@
+"""What an export could not translate faithfully, said once each."""
+
+from __future__ import annotations
+
+import logging
+
+logger = logging.getLogger("segue.blender")
+
+
+class ExportLog:
+    """Collects the warnings of one export, in the order of their first appearance."""
+
+    def __init__(self) -> None:
+        self._messages: dict[str, None] = {}
+
+    def warn(self, message: str) -> None:
+        """Note `message`; a repetition of an earlier one is dropped."""
+        if message not in self._messages:
+            self._messages[message] = None
+            logger.warning("%s", message)
+
+    @property
+    def messages(self) -> list[str]:
+        """Every distinct warning so far."""
+        return list(self._messages)

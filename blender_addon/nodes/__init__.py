@@ -1,0 +1,1 @@
+"""From shader node trees to the closures and textures of the ABI."""

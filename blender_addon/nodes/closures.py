@@ -1,0 +1,239 @@
+"""Shader nodes as closures of the ABI, by one table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+
+from .evaluate import Evaluator
+from .tree import Stack, is_linked, resolve, socket
+from .values import KINDS, Constant, ImageValue, convert
+
+Closure = dict[str, Any]
+
+BLACK: Closure = {"type": "diffuse", "color": [0.0, 0.0, 0.0]}
+
+
+@dataclass(frozen=True)
+class Shader:
+    """How a node becomes a closure.
+
+    `keys`: ABI key -> input identifier. `extra`: keys with a fixed value. `ignored`: inputs that
+    Segue has no key for, and the value at which they do nothing. Inputs that a version of Blender
+    does not have are skipped.
+    """
+
+    closure: str
+    keys: dict[str, str]
+    extra: dict[str, Any] = field(default_factory=dict)
+    ignored: dict[str, float | None] = field(default_factory=dict)
+    normals: dict[str, str] = field(default_factory=lambda: {"normal": "Normal"})
+
+
+# None: the input does nothing while it is unlinked.
+_TANGENT: dict[str, float | None] = {"Tangent": None}
+_THIN_FILM: dict[str, float | None] = {"Thin Film Thickness": 0.0}
+
+SHADERS: dict[str, Shader] = {
+    "ShaderNodeBsdfDiffuse": Shader("diffuse", {"color": "Color", "roughness": "Roughness"}),
+    "ShaderNodeBsdfAnisotropic": Shader(
+        "glossy",
+        {"color": "Color", "roughness": "Roughness", "anisotropy": "Anisotropy", "rotation": "Rotation"},
+        ignored=_TANGENT,
+    ),
+    "ShaderNodeBsdfGlass": Shader(
+        "glass", {"color": "Color", "roughness": "Roughness", "ior": "IOR"}, ignored=_THIN_FILM
+    ),
+    "ShaderNodeBsdfRefraction": Shader("refraction", {"color": "Color", "roughness": "Roughness", "ior": "IOR"}),
+    "ShaderNodeBsdfTransparent": Shader("transparent", {"color": "Color"}, normals={}),
+    "ShaderNodeBsdfTranslucent": Shader("translucent", {"color": "Color"}),
+    "ShaderNodeBsdfSheen": Shader("sheen", {"color": "Color", "roughness": "Roughness"}),
+    "ShaderNodeBsdfMetallic": Shader(
+        "principled",
+        {
+            "base_color": "Base Color",
+            "specular_tint": "Edge Tint",
+            "roughness": "Roughness",
+            "anisotropy": "Anisotropy",
+            "rotation": "Rotation",
+        },
+        extra={"metallic": 1.0},
+        ignored=_TANGENT | _THIN_FILM,
+    ),
+    "ShaderNodeEmission": Shader("emission", {"color": "Color", "strength": "Strength"}, normals={}),
+    "ShaderNodeBackground": Shader("emission", {"color": "Color", "strength": "Strength"}, normals={}),
+    "ShaderNodeSubsurfaceScattering": Shader("diffuse", {"color": "Color"}),
+    "ShaderNodeBsdfPrincipled": Shader(
+        "principled",
+        {
+            "base_color": "Base Color",
+            "diffuse_roughness": "Diffuse Roughness",
+            "metallic": "Metallic",
+            "roughness": "Roughness",
+            "ior": "IOR",
+            "specular_level": "Specular IOR Level",
+            "specular_tint": "Specular Tint",
+            "anisotropy": "Anisotropic",
+            "rotation": "Anisotropic Rotation",
+            "transmission": "Transmission Weight",
+            "coat": "Coat Weight",
+            "coat_roughness": "Coat Roughness",
+            "coat_ior": "Coat IOR",
+            "coat_tint": "Coat Tint",
+            "sheen": "Sheen Weight",
+            "sheen_roughness": "Sheen Roughness",
+            "sheen_tint": "Sheen Tint",
+            "emission_color": "Emission Color",
+            "emission_strength": "Emission Strength",
+        },
+        ignored=_TANGENT | _THIN_FILM | {"Thin Wall": 0.0},
+        normals={"normal": "Normal", "coat_normal": "Coat Normal"},
+    ),
+}
+
+# Shaders without a counterpart: the closure that comes nearest, and how that is said.
+_NEAREST: dict[str, tuple[str, str]] = {
+    "ShaderNodeBsdfToon": ("diffuse", "a diffuse surface is used"),
+    "ShaderNodeBsdfHair": ("diffuse", "a diffuse surface is used"),
+    "ShaderNodeBsdfHairPrincipled": ("diffuse", "a diffuse surface is used"),
+    "ShaderNodeEeveeSpecular": ("diffuse", "a diffuse surface of its base colour is used"),
+    "ShaderNodeBsdfRayPortal": ("transparent", "light passes straight through"),
+    "ShaderNodeHoldout": ("black", "a black surface is used"),
+}
+
+
+class ClosureTranslator:
+    """Translates the closures of one node tree."""
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self.ev = evaluator
+
+    def closure(self, entry: bpy.types.NodeSocket, stack: Stack = ()) -> Closure:
+        """The closure that arrives at a shader input; black where nothing does."""
+        source = resolve(entry, stack)
+        node = source.node
+        if node is None:
+            return BLACK
+        if source.output.type != "SHADER":
+            # Blender shows a colour that is plugged into a shader input as emission.
+            value = convert(self.ev.value(entry, stack), "color")
+            return {"type": "emission", "color": self.ev.textures.json(value, "color"), "strength": 1.0}
+        if node.bl_idname == "ShaderNodeMixShader":
+            return self._mix(node, source.stack)
+        if node.bl_idname == "ShaderNodeAddShader":
+            a, b = (self.closure(entry, source.stack) for entry in node.inputs)
+            return {"type": "add", "a": a, "b": b}
+        shader = SHADERS.get(node.bl_idname)
+        if shader is None:
+            return self._nearest(node, source.stack)
+        return self._shader(node, shader, source.stack)
+
+    def _mix(self, node: bpy.types.Node, stack: Stack) -> Closure:
+        factor = self.ev.value(node.inputs[0], stack)
+        if isinstance(factor, Constant):
+            share = min(max(factor.rgb[0], 0.0), 1.0)
+            # A branch that has no share is not translated, so that nothing is said about it.
+            if share in {0.0, 1.0}:
+                return self.closure(node.inputs[1 + int(share)], stack)
+            factor = Constant.number(share)
+        return {
+            "type": "mix",
+            "factor": self.ev.textures.json(factor, "float"),
+            "a": self.closure(node.inputs[1], stack),
+            "b": self.closure(node.inputs[2], stack),
+        }
+
+    def _nearest(self, node: bpy.types.Node, stack: Stack) -> Closure:
+        kind, text = _NEAREST.get(node.bl_idname, ("black", "black is used"))
+        self.ev.warn(node, "this shader", text)
+        if kind == "black":
+            return BLACK
+        colors = [entry for entry in node.inputs if entry.type == "RGBA"]
+        return {"type": kind, "color": self.ev.textures.json(self.ev.value(colors[0], stack), "color")}
+
+    def _shader(self, node: bpy.types.Node, shader: Shader, stack: Stack) -> Closure:
+        result: Closure = {"type": shader.closure, **shader.extra}
+        for key, identifier in shader.keys.items():
+            entry = socket(node, identifier)
+            if entry is not None:
+                value = self.ev.value(entry, stack)
+                result[key] = self.ev.textures.json(value, KINDS[entry.type])
+        for key, identifier in shader.normals.items():
+            normal = self._normal(socket(node, identifier), stack)
+            if normal is not None:
+                result[key] = normal
+        self._warn_ignored(node, shader, stack)
+        if node.bl_idname == "ShaderNodeBsdfPrincipled":
+            return self._with_alpha(node, result, stack)
+        return result
+
+    def _with_alpha(self, node: bpy.types.Node, closure: Closure, stack: Stack) -> Closure:
+        alpha = self.ev.value(socket(node, "Alpha"), stack)
+        if isinstance(alpha, Constant) and alpha.rgb[0] >= 1.0:
+            return closure
+        return {
+            "type": "mix",
+            "factor": self.ev.textures.json(alpha, "float"),
+            "a": {"type": "transparent", "color": [1.0, 1.0, 1.0]},
+            "b": closure,
+        }
+
+    def _warn_ignored(self, node: bpy.types.Node, shader: Shader, stack: Stack) -> None:
+        for identifier, neutral in shader.ignored.items():
+            entry = socket(node, identifier)
+            if entry is None:
+                continue
+            if neutral is None:
+                active = is_linked(entry)
+            else:
+                value = self.ev.value(entry, stack)
+                active = not isinstance(value, Constant) or value.rgb[0] != neutral
+            if active:
+                self.ev.warn(node, f"'{entry.name}'", "it is left out")
+        self._warn_special(node, stack)
+
+    def _warn_special(self, node: bpy.types.Node, stack: Stack) -> None:
+        """Approximations that depend on more than one socket."""
+        kind = node.bl_idname
+        weight = socket(node, "Subsurface Weight")
+        if kind == "ShaderNodeSubsurfaceScattering" or (
+            weight is not None and self.ev.value(weight, stack) != Constant.number(0.0)
+        ):
+            self.ev.warn(node, "subsurface scattering", "diffuse reflection of the same colour is used")
+        if kind == "ShaderNodeBsdfMetallic" and node.fresnel_type != "F82":
+            self.ev.warn(node, "a measured conductor", "Base Color and Edge Tint are used")
+        if getattr(node, "distribution", "") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"}:
+            self.ev.warn(node, f"the {node.distribution.title()} distribution", "GGX is used")
+
+    def _normal(self, entry: bpy.types.NodeSocket | None, stack: Stack) -> dict[str, Any] | None:
+        """The normal map at a Normal input; None for the surface's own normal."""
+        source = resolve(entry, stack) if entry is not None else None
+        if source is None or source.node is None:
+            return None
+        node = source.node
+        if node.bl_idname == "ShaderNodeBump":
+            self.ev.warn(node, "bump mapping", "the normal below it is used")
+            return self._normal(node.inputs["Normal"], source.stack)
+        if node.bl_idname == "ShaderNodeNewGeometry" and source.output.identifier == "Normal":
+            return None
+        if node.bl_idname != "ShaderNodeNormalMap":
+            self.ev.warn(node, "a computed normal", "the surface's own is used")
+            return None
+        return self._normal_map(node, source.stack)
+
+    def _normal_map(self, node: bpy.types.Node, stack: Stack) -> dict[str, Any] | None:
+        space = {"TANGENT": "tangent", "OBJECT": "object", "WORLD": "world"}.get(node.space)
+        value = self.ev.value(node.inputs["Color"], stack)
+        if isinstance(value, Constant):
+            return None
+        if space is None or not isinstance(value, ImageValue) or value.channel != "rgb":
+            self.ev.warn(node, "a normal map of this kind", "the surface's own normal is used")
+            return None
+        return {
+            "texture": self.ev.textures.texture(value, scale=2.0, bias=-1.0),
+            "strength": self.ev.textures.json(self.ev.value(node.inputs["Strength"], stack), "float"),
+            "space": space,
+            "uv": node.uv_map if space == "tangent" else "",
+        }

@@ -1,0 +1,130 @@
+"""Texture coordinates: chains of mapping nodes folded into one matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Euler
+
+from .tree import Source, Stack, resolve, socket
+from .values import Constant, UnsupportedError, Value
+
+# Gives the value of an input socket.
+Evaluate = Callable[[bpy.types.NodeSocket, Stack], Value]
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """`matrix` (4x4) times a UV map, or times the direction of a ray that leaves the scene."""
+
+    space: str
+    uv: str
+    matrix: np.ndarray
+
+    def uv_transform(self) -> tuple[float, ...]:
+        """The six numbers of the ABI's texture transform; UV maps have a third component of 0."""
+        return tuple(float(value) for value in self.matrix[:2][:, [0, 1, 3]].ravel())
+
+    def direction_matrix(self) -> tuple[float, ...]:
+        """The nine numbers applied to a direction; one that is also shifted cannot be expressed."""
+        if np.abs(self.matrix[:3, 3]).max() > 1e-6:
+            raise UnsupportedError("a shifted environment")
+        return tuple(float(value) for value in self.matrix[:3, :3].ravel())
+
+
+def _constant(entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate) -> np.ndarray:
+    value = evaluate(entry, stack)
+    if not isinstance(value, Constant):
+        raise UnsupportedError(f"a textured input '{entry.name}' of '{entry.node.name}'")
+    return np.array(value.rgb)
+
+
+def _linear(matrix: np.ndarray) -> np.ndarray:
+    result = np.eye(4)
+    result[:3, :3] = matrix
+    return result
+
+
+def _shift(offset: np.ndarray) -> np.ndarray:
+    result = np.eye(4)
+    result[:3, 3] = offset
+    return result
+
+
+def _mapping(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> np.ndarray:
+    """Matrix of a Mapping node."""
+    rotation = _linear(np.array(Euler(_constant(node.inputs["Rotation"], stack, evaluate), "XYZ").to_matrix()))
+    scale = _constant(node.inputs["Scale"], stack, evaluate)
+    kind = node.vector_type
+    if kind in {"VECTOR", "NORMAL"}:
+        if kind == "NORMAL":
+            scale = np.where(scale != 0, 1.0 / np.where(scale != 0, scale, 1.0), 0.0)
+        return rotation @ _linear(np.diag(scale))
+    location = _shift(_constant(node.inputs["Location"], stack, evaluate))
+    if kind == "POINT":
+        return location @ rotation @ _linear(np.diag(scale))
+    inverse = np.where(scale != 0, 1.0 / np.where(scale != 0, scale, 1.0), 0.0)
+    return _linear(np.diag(inverse)) @ np.linalg.inv(location @ rotation)
+
+
+def _vector_math(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> tuple[np.ndarray, bpy.types.NodeSocket]:
+    """Matrix of a Vector Math node that is linear in one input, and that input."""
+    first, second = node.inputs[0], node.inputs[1]
+    operation = node.operation
+    if operation == "SCALE":
+        return _linear(np.diag(_constant(socket(node, "Scale"), stack, evaluate))), first
+    if operation in {"ADD", "MULTIPLY"} and isinstance(evaluate_quietly(first, stack, evaluate), Constant):
+        first, second = second, first
+    if operation in {"ADD", "SUBTRACT"}:
+        offset = _constant(second, stack, evaluate)
+        return _shift(offset if operation == "ADD" else -offset), first
+    if operation in {"MULTIPLY", "DIVIDE"}:
+        factor = _constant(second, stack, evaluate)
+        if operation == "DIVIDE":
+            factor = np.where(factor != 0, 1.0 / np.where(factor != 0, factor, 1.0), 0.0)
+        return _linear(np.diag(factor)), first
+    raise UnsupportedError(f"the vector operation {operation.lower()} on texture coordinates")
+
+
+def evaluate_quietly(entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate) -> Value | None:
+    """The value of a socket if it is unlinked, None otherwise: only asks what is surely constant."""
+    return None if resolve(entry, stack).node is not None else evaluate(entry, stack)
+
+
+def coordinates(entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate, *, world: bool) -> Coordinates:
+    """The coordinates that arrive at a texture's Vector input."""
+    matrix = np.eye(4)
+    while True:
+        source = resolve(entry, stack)
+        node, stack = source.node, source.stack
+        if node is None:
+            # An unlinked input means the default UV map, and for a world the direction.
+            return Coordinates("environment" if world else "uv", "", matrix)
+        if node.bl_idname == "ShaderNodeMapping":
+            matrix = matrix @ _mapping(node, stack, evaluate)
+            entry = node.inputs["Vector"]
+        elif node.bl_idname == "ShaderNodeVectorMath":
+            step, entry = _vector_math(node, stack, evaluate)
+            matrix = matrix @ step
+        else:
+            space, uv = _origin(source, world)
+            return Coordinates(space, uv, matrix)
+
+
+def _origin(source: Source, world: bool) -> tuple[str, str]:
+    """What a node provides at the start of a chain: a UV map by name, or the direction."""
+    node, name = source.node, source.output.identifier
+    kind = node.bl_idname
+    if world:
+        if kind == "ShaderNodeTexCoord" and (name == "Generated" or (name == "Object" and node.object is None)):
+            return "environment", ""
+    elif kind == "ShaderNodeUVMap" and not node.from_instancer:
+        return "uv", node.uv_map
+    elif kind == "ShaderNodeTexCoord" and name == "UV" and not node.from_instancer:
+        return "uv", ""
+    elif kind == "ShaderNodeAttribute" and name == "Vector" and node.attribute_type == "GEOMETRY":
+        return "uv", node.attribute_name
+    raise UnsupportedError(f"coordinates from the output '{source.output.name}' of '{node.name}'")

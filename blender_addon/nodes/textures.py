@@ -1,0 +1,103 @@
+"""Images and attributes as the ABI's images and textures, each added once."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..export.images import Pixels, read_image
+from ..log import ExportLog
+from .values import AttributeValue, Constant, ImageSource, ImageValue, Kind, Value
+
+
+class BlenderSource:
+    """An image of the .blend file, read when it is first needed."""
+
+    def __init__(self, image: bpy.types.Image, straight_alpha: bool, log: ExportLog) -> None:
+        self.name = image.name
+        self._image = image
+        self._straight = straight_alpha
+        self._log = log
+        self._pixels: Pixels | None = None
+
+    def pixels(self) -> Pixels:
+        """The pixels as Blender stores them; magenta for an image that cannot be read."""
+        if self._pixels is None:
+            self._pixels = read_image(self._image, self._log, straight_alpha=self._straight)
+        if self._pixels is None:
+            self._log.warn(f"Image '{self.name}': it cannot be read, magenta is used")
+            self._pixels = Pixels(np.array([[[1.0, 0.0, 1.0]]], np.float32), "linear")
+        return self._pixels
+
+    def texels(self) -> np.ndarray:
+        """See `ImageSource`."""
+        return self.pixels().linear()
+
+
+class TextureStore:
+    """Adds images and textures to the scene, and remembers which are there."""
+
+    def __init__(self, scene: Any, log: ExportLog) -> None:
+        self._scene = scene
+        self._log = log
+        self._sources: dict[tuple[int, bool], BlenderSource] = {}
+        self._images: dict[int, tuple[ImageSource, int]] = {}
+        self._textures: dict[str, int] = {}
+        self.attributes: set[str] = set()
+
+    def source(self, image: bpy.types.Image, straight_alpha: bool) -> BlenderSource:
+        """The source for an image, one for each treatment of its alpha."""
+        key = (image.as_pointer(), straight_alpha)
+        if key not in self._sources:
+            self._sources[key] = BlenderSource(image, straight_alpha, self._log)
+        return self._sources[key]
+
+    def image(self, source: ImageSource) -> int:
+        """Id of a source's image in the scene."""
+        # The source is kept along with the id, so that its identity stays taken.
+        if id(source) not in self._images:
+            if isinstance(source, BlenderSource):
+                pixels = source.pixels()
+                values, colorspace = pixels.values, pixels.colorspace
+            else:
+                values, colorspace = source.texels(), "linear"
+            identifier = self._scene.add_image(source.name, values, colorspace)
+            self._images[id(source)] = (source, identifier)
+        return self._images[id(source)][1]
+
+    def texture(self, value: ImageValue | AttributeValue, scale: float = 1.0, bias: float = 0.0) -> int:
+        """Id of the texture that yields `scale * value + bias`."""
+        if isinstance(value, AttributeValue):
+            self.attributes.add(value.name)
+            name = value.name
+            data: dict[str, Any] = {"type": "attribute", "name": value.name, "default": [0.0, 0.0, 0.0, 1.0]}
+        else:
+            sampling = value.sampling
+            if sampling.uv:
+                self.attributes.add(sampling.uv)
+            name = value.source.name
+            data = {
+                "type": "image",
+                "image": self.image(value.source),
+                "uv": sampling.uv,
+                "transform": list(sampling.matrix),
+                "wrap_s": sampling.wrap,
+                "wrap_t": sampling.wrap,
+                "filter": sampling.filter,
+            }
+            if (scale, bias) != (1.0, 0.0):
+                data["scale"] = [scale, scale, scale, 1.0]
+                data["bias"] = [bias, bias, bias, 0.0]
+        key = json.dumps(data, sort_keys=True)
+        if key not in self._textures:
+            self._textures[key] = self._scene.add_texture(name, data)
+        return self._textures[key]
+
+    def json(self, value: Value, kind: Kind) -> Any:
+        """A value as the ABI writes it, for a key that takes a number or a colour."""
+        if isinstance(value, Constant):
+            return value.rgb[0] if kind == "float" else list(value.rgb)
+        return {"texture": self.texture(value), "channel": value.channel}

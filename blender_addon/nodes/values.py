@@ -1,0 +1,186 @@
+"""Values on their way through a node tree: constants, images, and mesh attributes.
+
+A value is a float, a colour or a vector; sockets convert between these as Blender's do. Arithmetic
+on images is done on their texels, which is exact but for the order of filtering and arithmetic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol
+
+import numpy as np
+
+Kind = Literal["float", "color", "vector"]
+
+# Blender's socket types; all others carry no value that a shader uses.
+KINDS: dict[str, Kind] = {
+    "VALUE": "float",
+    "INT": "float",
+    "BOOLEAN": "float",
+    "RGBA": "color",
+    "VECTOR": "vector",
+}
+
+# Luminance of linear Rec.709.
+_LUMINANCE = np.array([0.2126390, 0.7151687, 0.0721923], np.float32)
+
+
+class UnsupportedError(Exception):
+    """A combination of values that cannot be expressed; the text says which."""
+
+
+class ImageSource(Protocol):
+    """Pixels that can become an image of the scene."""
+
+    name: str
+
+    def texels(self) -> np.ndarray:
+        """(height, width, 4) float32, linear, row 0 on top."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """The same value everywhere."""
+
+    rgb: tuple[float, float, float]
+    kind: Kind
+
+    @staticmethod
+    def number(value: float) -> Constant:
+        """A float."""
+        return Constant((float(value),) * 3, "float")
+
+    @staticmethod
+    def color(values: object) -> Constant:
+        """A colour, from a sequence of at least three numbers."""
+        r, g, b = tuple(values)[:3]  # type: ignore[call-overload]
+        return Constant((float(r), float(g), float(b)), "color")
+
+    @staticmethod
+    def vector(values: object) -> Constant:
+        """A vector, from a sequence of at least three numbers."""
+        return replace(Constant.color(values), kind="vector")
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How an image is looked up.
+
+    `matrix`: for "uv" the six numbers of the ABI's texture transform, for "environment" the nine of
+    a 3x3 matrix applied to the direction.
+    """
+
+    space: Literal["uv", "environment"]
+    matrix: tuple[float, ...]
+    uv: str = ""
+    wrap: str = "repeat"
+    filter: str = "linear"
+
+
+@dataclass(frozen=True, eq=False)
+class ImageValue:
+    """An image; `channel` is one of the ABI's, and "rgb" for colours and vectors."""
+
+    source: ImageSource
+    sampling: Sampling
+    kind: Kind = "color"
+    channel: str = "rgb"
+
+
+@dataclass(frozen=True)
+class AttributeValue:
+    """An attribute of the mesh, such as vertex colours."""
+
+    name: str
+    kind: Kind = "color"
+    channel: str = "rgb"
+
+
+Value = Constant | ImageValue | AttributeValue
+
+
+@dataclass(eq=False)
+class Baked:
+    """An image that was computed from others. `values`: (height, width, 1 or 3), linear."""
+
+    name: str
+    values: np.ndarray = field(repr=False)
+
+    def texels(self) -> np.ndarray:
+        """See `ImageSource`."""
+        height, width, channels = self.values.shape
+        result = np.ones((height, width, 4), np.float32)
+        result[..., :3] = self.values if channels == 3 else np.repeat(self.values, 3, axis=2)
+        return result
+
+
+def convert(value: Value, kind: Kind) -> Value:
+    """What a socket of another kind makes of a value."""
+    if value.kind == kind:
+        return value
+    if isinstance(value, Constant):
+        if kind != "float":
+            return replace(value, kind=kind)
+        return Constant.number(_grey(np.array(value.rgb), value.kind)[0])
+    if kind == "float" and value.channel == "rgb":
+        return replace(value, kind=kind, channel="luminance" if value.kind == "color" else "average")
+    return replace(value, kind=kind)
+
+
+def _grey(rgb: np.ndarray, kind: Kind) -> np.ndarray:
+    """Colours become their luminance, vectors their mean; the last axis shrinks to one."""
+    if kind == "color":
+        return (rgb @ _LUMINANCE.astype(rgb.dtype))[..., None]
+    return rgb.mean(axis=-1, keepdims=True)
+
+
+def array(value: Value) -> np.ndarray:
+    """A value as (height, width, 1 or 3) floats; constants have size 1 by 1."""
+    if isinstance(value, Constant):
+        width = 1 if value.kind == "float" else 3
+        return np.array(value.rgb[:width], np.float32).reshape(1, 1, width)
+    if isinstance(value, AttributeValue):
+        raise UnsupportedError("arithmetic on a mesh attribute")
+    texels = value.source.texels()
+    if value.channel == "rgb":
+        return texels[..., :3]
+    if value.channel in "rgba":
+        result = texels[..., ["rgba".index(value.channel)]]
+    else:
+        result = _grey(texels[..., :3], "color" if value.channel == "luminance" else "vector")
+    return result if value.kind == "float" else np.repeat(result, 3, axis=2)
+
+
+def average(value: Value) -> Constant:
+    """The mean of a value, as a constant."""
+    if isinstance(value, Constant):
+        return value
+    if isinstance(value, AttributeValue):
+        return Constant((1.0, 1.0, 1.0), value.kind)
+    mean = array(value).mean(axis=(0, 1))
+    if value.kind == "float":
+        return Constant.number(mean[0])
+    return replace(Constant.color(mean), kind=value.kind)
+
+
+def combine(name: str, kind: Kind, function: Callable[..., np.ndarray], *values: Value) -> Value:
+    """Apply `function` to the arrays of `values`: to one number, or to every texel.
+
+    Images must be looked up alike and have one size, since no other image could hold the result.
+    """
+    images = [value for value in values if isinstance(value, ImageValue)]
+    if any(image.sampling != images[0].sampling for image in images):
+        raise UnsupportedError("images with different mappings")
+    arrays = [array(value) for value in values]
+    sizes = {values.shape[:2] for values in arrays} - {(1, 1)}
+    if len(sizes) > 1:
+        raise UnsupportedError("images of different sizes")
+    with np.errstate(all="ignore"):
+        result = np.nan_to_num(np.asarray(function(*arrays), np.float32), nan=0.0, posinf=0.0, neginf=0.0)
+    if not images:
+        flat = result.ravel()
+        return Constant.number(flat[0]) if kind == "float" else replace(Constant.color(flat), kind=kind)
+    channel = "r" if kind == "float" else "rgb"
+    return ImageValue(Baked(name, result), images[0].sampling, kind, channel)

@@ -1,0 +1,86 @@
+"""The render passes: which Blender switch asks for which pass of Segue, under which name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import bpy
+
+# Blender 5.0 renamed its built-in passes; compositor sockets carry these names.
+_LONG_NAMES = bpy.app.version >= (5, 0, 0)
+
+
+@dataclass(frozen=True)
+class RenderPass:
+    """One pass as Blender stores it.
+
+    `source` is Segue's name, `name` Blender's, `channels` names one letter a channel, `kind` is
+    Blender's pass type, and `switch` the view layer property that asks for it (of the view layer
+    itself, or of its `segue` group when `custom`). `background` replaces the values of pixels
+    where nothing was hit.
+    """
+
+    source: str
+    name: str
+    channels: str
+    kind: str
+    switch: str | None = None
+    custom: bool = False
+    background: float | None = None
+
+
+PASSES: tuple[RenderPass, ...] = (
+    RenderPass("Combined", "Combined", "RGBA", "COLOR"),
+    # Blender marks "nothing there" by a depth of 1e10, which its compositor and mist rely on.
+    RenderPass("Depth", "Depth", "Z", "VALUE", "use_pass_z", background=1e10),
+    RenderPass("Position", "Position", "XYZ", "VECTOR", "use_pass_position"),
+    RenderPass("Normal", "Normal", "XYZ", "VECTOR", "use_pass_normal"),
+    RenderPass("UV", "UV", "UVA", "VECTOR", "use_pass_uv"),
+    RenderPass("ObjectIndex", "Object Index" if _LONG_NAMES else "IndexOB", "X", "VALUE", "use_pass_object_index"),
+    RenderPass(
+        "MaterialIndex", "Material Index" if _LONG_NAMES else "IndexMA", "X", "VALUE", "use_pass_material_index"
+    ),
+    RenderPass("Emission", "Emission" if _LONG_NAMES else "Emit", "RGB", "COLOR", "use_pass_emit"),
+    RenderPass("Albedo", "Albedo", "RGB", "COLOR", "use_pass_albedo", custom=True),
+    RenderPass("Direct", "Direct", "RGB", "COLOR", "use_pass_direct", custom=True),
+    RenderPass("Indirect", "Indirect", "RGB", "COLOR", "use_pass_indirect", custom=True),
+)
+
+# Switches of Blender's own view layer that Segue has no pass for.
+_UNSUPPORTED = (
+    "use_pass_mist",
+    "use_pass_vector",
+    "use_pass_shadow",
+    "use_pass_ambient_occlusion",
+    "use_pass_environment",
+    "use_pass_diffuse_direct",
+    "use_pass_diffuse_indirect",
+    "use_pass_diffuse_color",
+    "use_pass_glossy_direct",
+    "use_pass_glossy_indirect",
+    "use_pass_glossy_color",
+    "use_pass_transmission_direct",
+    "use_pass_transmission_indirect",
+    "use_pass_transmission_color",
+    "use_pass_subsurface_direct",
+    "use_pass_subsurface_indirect",
+    "use_pass_subsurface_color",
+    "use_pass_cryptomatte_object",
+    "use_pass_cryptomatte_material",
+    "use_pass_cryptomatte_asset",
+)
+
+
+def enabled(view_layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
+    """The passes that `view_layer` asks for; Combined is always among them."""
+    for render_pass in PASSES:
+        owner = view_layer.segue if render_pass.custom else view_layer
+        if render_pass.switch is None or getattr(owner, render_pass.switch):
+            yield render_pass
+
+
+def unsupported(view_layer: bpy.types.ViewLayer) -> list[str]:
+    """Labels of the passes that are switched on and that Segue cannot render."""
+    properties = view_layer.bl_rna.properties
+    return [properties[switch].name for switch in _UNSUPPORTED if switch in properties and getattr(view_layer, switch)]
