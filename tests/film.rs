@@ -20,8 +20,8 @@ fn noisy(x: u32, y: u32, iteration: u32) -> Sample {
     let (emission, direct) = (rgb(0), rgb(3));
     let hit = FirstHit {
         depth: u(6),
-        position: rgb(7),
-        normal: rgb(10),
+        position: 10.0 * rgb(7) - 5.0,
+        normal: 2.0 * rgb(10) - 1.0,
         albedo: rgb(13),
         uv: Vec2::new(u(16), u(17)),
         object_index: hash(x, y) % 100,

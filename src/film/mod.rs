@@ -12,6 +12,7 @@
 mod buffer;
 mod error;
 mod filter;
+mod noise;
 mod openexr;
 mod pass;
 mod rect;

@@ -47,25 +47,17 @@ impl Sample {
         self.radiance - self.emission - self.direct
     }
 
-    /// The sample with negative rounding set to zero, or `None` if something in it is not finite or is
-    /// negative beyond rounding.
-    pub(super) fn checked(&self) -> Option<Sample> {
+    /// Whether everything in it is finite and nothing is negative beyond rounding.
+    pub(super) fn is_good(&self) -> bool {
         let floor = -ROUNDING * self.radiance.abs().max_element();
         // NaN fails every comparison
         let light = |v: Vec3| v.is_finite() && v.min_element() >= floor;
-        let good = light(self.radiance)
+        light(self.radiance)
             && light(self.emission)
             && light(self.direct)
             && light(self.indirect())
             && (-ROUNDING..=1.0 + ROUNDING).contains(&self.alpha)
-            && self.first_hit.as_ref().is_none_or(FirstHit::is_finite);
-        good.then(|| Sample {
-            radiance: self.radiance.max(Vec3::ZERO),
-            alpha: self.alpha.clamp(0.0, 1.0),
-            emission: self.emission.max(Vec3::ZERO),
-            direct: self.direct.max(Vec3::ZERO),
-            first_hit: self.first_hit,
-        })
+            && self.first_hit.as_ref().is_none_or(FirstHit::is_finite)
     }
 }
 
@@ -88,29 +80,29 @@ mod tests {
     }
 
     #[test]
-    fn good_samples_pass_unchanged() {
+    fn good_samples_are_told_from_bad_ones() {
         let hit = FirstHit { normal: Vec3::NEG_Z, uv: Vec2::new(-3.0, 7.0), ..Default::default() };
-        let s = Sample { emission: Vec3::X, first_hit: Some(hit), ..grey(1.0) };
-        assert_eq!(s.checked(), Some(s));
-        assert_eq!(Sample::default().checked(), Some(Sample::default()));
-        assert!(grey(f32::MAX).checked().is_some());
+        assert!(Sample { emission: Vec3::X, first_hit: Some(hit), ..grey(1.0) }.is_good());
+        assert!(Sample::default().is_good());
+        assert!(grey(f32::MAX).is_good());
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert!(!Sample { radiance: Vec3::new(0.0, bad, 0.0), ..grey(1.0) }.is_good());
+            assert!(!Sample { emission: Vec3::new(bad, 0.0, 0.0), ..grey(1.0) }.is_good());
+            assert!(!Sample { direct: Vec3::new(0.0, 0.0, bad), ..grey(1.0) }.is_good());
+            assert!(!Sample { alpha: bad, ..grey(1.0) }.is_good());
+            let hit = FirstHit { depth: bad, ..Default::default() };
+            assert!(!Sample { first_hit: Some(hit), ..grey(1.0) }.is_good());
+        }
     }
 
     #[test]
-    fn rounding_is_mended_and_anything_worse_refused() {
-        let tiny = Sample { radiance: Vec3::new(100.0, -1e-3, 0.0), ..grey(0.0) };
-        assert_eq!(tiny.checked().unwrap().radiance, Vec3::new(100.0, 0.0, 0.0));
-        assert!(Sample { radiance: Vec3::new(100.0, -0.1, 0.0), ..grey(0.0) }.checked().is_none());
-        assert!(grey(-1e-9).checked().is_none(), "wholly negative is not rounding");
-        assert!(Sample { direct: Vec3::splat(1.1), ..grey(1.0) }.checked().is_none());
-        assert!(Sample { alpha: 1.5, ..grey(1.0) }.checked().is_none());
-        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            assert!(Sample { radiance: Vec3::new(0.0, bad, 0.0), ..grey(1.0) }.checked().is_none());
-            assert!(Sample { emission: Vec3::new(bad, 0.0, 0.0), ..grey(1.0) }.checked().is_none());
-            assert!(Sample { direct: Vec3::new(0.0, 0.0, bad), ..grey(1.0) }.checked().is_none());
-            assert!(Sample { alpha: bad, ..grey(1.0) }.checked().is_none());
-            let hit = FirstHit { depth: bad, ..Default::default() };
-            assert!(Sample { first_hit: Some(hit), ..grey(1.0) }.checked().is_none());
-        }
+    fn rounding_is_forgiven_and_nothing_worse() {
+        let channel = |v| Sample { radiance: Vec3::new(100.0, v, 0.0), ..grey(0.0) };
+        assert!(channel(-1e-3).is_good());
+        assert!(!channel(-0.1).is_good());
+        assert!(!grey(-1e-9).is_good(), "wholly negative is not rounding");
+        assert!(Sample { direct: Vec3::splat(1.00001), ..grey(1.0) }.is_good());
+        assert!(!Sample { direct: Vec3::splat(1.1), ..grey(1.0) }.is_good());
+        assert!(!Sample { alpha: 1.5, ..grey(1.0) }.is_good());
     }
 }

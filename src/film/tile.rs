@@ -56,10 +56,16 @@ fn zeros<T: Copy + Default>(wanted: bool, count: usize) -> Result<Vec<T>, TryRes
 
 /// Adds to the sum of a pixel, if the pass is kept.
 #[inline]
-fn add(sums: &mut [DVec3], pixel: usize, value: Vec3) {
+fn add(sums: &mut [DVec3], pixel: usize, value: DVec3) {
     if let Some(sum) = sums.get_mut(pixel) {
-        *sum += value.as_dvec3();
+        *sum += value;
     }
+}
+
+/// Light without negative rounding.
+#[inline]
+fn light(value: Vec3) -> DVec3 {
+    value.max(Vec3::ZERO).as_dvec3()
 }
 
 /// Sets the value of a pixel, if the pass is kept.
@@ -123,21 +129,21 @@ impl Tile {
     /// Adds a sample to pixel `(x, y)` of the film, which must lie in the tile. A sample that is not finite,
     /// or negative beyond rounding, is left out and counted ([`super::Film::rejected_samples`]).
     pub fn add(&mut self, x: u32, y: u32, sample: &Sample) {
-        let Some(sample) = sample.checked() else {
+        if !sample.is_good() {
             self.rejected += 1;
             return;
-        };
+        }
         let pixel = self.rect.index(x, y);
         let half = self.counts[pixel] as usize & 1;
         self.counts[pixel] += 1;
-        self.halves[pixel][half] += sample.radiance.as_dvec3();
-        self.alpha[pixel] += sample.alpha as f64;
-        add(&mut self.sums.emission, pixel, sample.emission);
-        add(&mut self.sums.direct, pixel, sample.direct);
-        add(&mut self.sums.indirect, pixel, sample.indirect().max(Vec3::ZERO));
+        self.halves[pixel][half] += light(sample.radiance);
+        self.alpha[pixel] += sample.alpha.clamp(0.0, 1.0) as f64;
+        add(&mut self.sums.emission, pixel, light(sample.emission));
+        add(&mut self.sums.direct, pixel, light(sample.direct));
+        add(&mut self.sums.indirect, pixel, light(sample.indirect()));
         if let Some(hit) = &sample.first_hit {
-            add(&mut self.sums.normal, pixel, hit.normal);
-            add(&mut self.sums.albedo, pixel, hit.albedo);
+            add(&mut self.sums.normal, pixel, hit.normal.as_dvec3());
+            add(&mut self.sums.albedo, pixel, hit.albedo.as_dvec3());
             self.first.record(pixel, hit);
         }
     }
@@ -155,6 +161,12 @@ impl Tile {
     /// Samples that were left out.
     pub(super) fn rejected(&self) -> u64 {
         self.rejected
+    }
+
+    /// Sums of radiance and sample counts of the two halves of a pixel.
+    pub(super) fn halves(&self, pixel: usize) -> ([DVec3; 2], [u32; 2]) {
+        let n = self.counts[pixel];
+        (self.halves[pixel], [n - n / 2, n / 2])
     }
 
     /// Writes the value of a pass, which must be one the tile keeps, to `out` (as many floats as the pass
@@ -205,5 +217,43 @@ impl FirstHits {
         set(&mut self.uv, pixel, hit.uv);
         set(&mut self.object_index, pixel, hit.object_index);
         set(&mut self.material_index, pixel, hit.material_index);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sampler::{hash, hash_unit};
+
+    fn grey(value: f32) -> Sample {
+        Sample { radiance: Vec3::splat(value), alpha: 1.0, ..Default::default() }
+    }
+
+    #[test]
+    fn halves_take_turns_over_the_samples_that_count() {
+        let mut tile = Tile::new(Rect::new(8, 4, 2, 1), PassSet::default()).unwrap();
+        for value in [1.0, 10.0, 2.0, f32::NAN, 20.0, 4.0] {
+            tile.add(9, 4, &grey(value));
+        }
+        assert_eq!(tile.halves(1), ([DVec3::splat(7.0), DVec3::splat(30.0)], [3, 2]));
+        assert_eq!(tile.halves(0), ([DVec3::ZERO; 2], [0, 0]));
+    }
+
+    #[test]
+    fn halves_of_independent_samples_are_uncorrelated() {
+        let rect = Rect::new(0, 0, 100, 100);
+        let mut tile = Tile::new(rect, PassSet::default()).unwrap();
+        for i in 0..6 {
+            rect.pixels().for_each(|(x, y)| tile.add(x, y, &grey(hash_unit(hash(x, y), i))));
+        }
+        // products of deviations, each half a mean of 3 uniform numbers
+        let sum: f64 = (0..rect.area())
+            .map(|pixel| {
+                let ([a, b], [na, nb]) = tile.halves(pixel);
+                (a.x / na as f64 - 0.5) * (b.x / nb as f64 - 0.5)
+            })
+            .sum();
+        let deviation = (1.0 / 12.0 / 3.0) * (rect.area() as f64).sqrt();
+        assert!(sum.abs() < 4.0 * deviation, "{} standard deviations", sum / deviation);
     }
 }

@@ -1,0 +1,304 @@
+//! How noisy the picture is, told without a reference.
+//!
+//! The relative mean squared error of a picture `x` against the truth `r`, over pixels and channels, is
+//! `mean((x - r)² / (r² + (0.01 mean r)²))`. The squared error is estimated from the two halves of each
+//! pixel's samples, which are independent pictures of the same thing: `((a - b) / 2)²` is an unbiased
+//! estimate of the variance of their mean. Systematic error is invisible to it.
+//!
+//! The `r` of the denominator cannot be the pixel itself: where it happens to be dark the quotient explodes.
+//! It is the mean of the pixel's neighbourhood, drawn back to the pixel where that differs from its
+//! neighbours by more than noise explains (the local linear estimator of J.-S. Lee, "Digital Image
+//! Enhancement and Noise Filtering by Use of Local Statistics", 1980).
+
+use super::{Film, Tile};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::iter::Sum;
+
+/// The neighbourhood of a pixel reaches this far to each side: 5 x 5 pixels. Wider ones blur edges more than
+/// they calm noise.
+const RADIUS: usize = 2;
+
+/// A pixel that has been sampled at least twice.
+#[derive(Clone, Copy)]
+struct Pixel {
+    mean: Vec3,
+    /// Estimated variance of `mean`.
+    variance: Vec3,
+}
+
+impl Film {
+    /// Estimated relative mean squared error of the picture as it stands now; `None` before any pixel has
+    /// two samples (pixels with fewer are left out).
+    ///
+    /// Right on average for independent samples. Samples that are spread evenly on purpose (low-discrepancy
+    /// sequences) make the picture better than their halves tell, so it errs to the safe side there. It
+    /// reads the whole film, in parallel: ask between iterations, not for every tile.
+    pub fn estimated_relmse(&self) -> Option<f64> {
+        let mut pixels = vec![None; self.rect().area()];
+        self.visit(self.rect(), |tile, pixel, place| pixels[place] = estimate(tile, pixel));
+        relmse(&pixels, self.width() as usize)
+    }
+}
+
+fn estimate(tile: &Tile, pixel: usize) -> Option<Pixel> {
+    let ([even, odd], counts) = tile.halves(pixel);
+    let [n, m] = counts.map(f64::from);
+    (m > 0.0).then(|| {
+        // a difference of means has variance v/n + v/m, the mean of all v/(n + m)
+        let difference = even / n - odd / m;
+        Pixel {
+            mean: ((even + odd) / (n + m)).as_vec3(),
+            variance: (difference * difference * (n * m / ((n + m) * (n + m)))).as_vec3().min(Vec3::MAX),
+        }
+    })
+}
+
+/// Sums over a neighbourhood.
+#[derive(Clone, Copy, Default)]
+struct Window {
+    mean: DVec3,
+    variance: DVec3,
+    count: f64,
+}
+
+impl From<&Option<Pixel>> for Window {
+    fn from(pixel: &Option<Pixel>) -> Self {
+        pixel.map_or(Window::default(), |p| Window {
+            mean: p.mean.as_dvec3(),
+            variance: p.variance.as_dvec3(),
+            count: 1.0,
+        })
+    }
+}
+
+impl Sum for Window {
+    fn sum<I: Iterator<Item = Window>>(windows: I) -> Window {
+        windows.fold(Window::default(), |a, b| Window {
+            mean: a.mean + b.mean,
+            variance: a.variance + b.variance,
+            count: a.count + b.count,
+        })
+    }
+}
+
+/// The estimate for a picture of rows of `width` pixels.
+fn relmse(pixels: &[Option<Pixel>], width: usize) -> Option<f64> {
+    // what rows give is summed in their order, whatever thread it came from
+    let row_sums: Vec<Window> =
+        pixels.par_chunks(width).map(|row| row.iter().map(Window::from).sum()).collect();
+    let known: Window = row_sums.into_iter().sum();
+    if known.count == 0.0 {
+        return None;
+    }
+    let floor = (0.01 * known.mean.element_sum() / (3.0 * known.count)).powi(2);
+    if floor == 0.0 {
+        // wholly black: no light was found, and nothing disagrees
+        return Some(0.0);
+    }
+    let rows: Vec<f64> =
+        (0..pixels.len() / width).into_par_iter().map(|y| row_error(pixels, width, y, floor)).collect();
+    Some(rows.iter().sum::<f64>() / (3.0 * known.count))
+}
+
+/// Sum of the relative squared errors of row `y`, over pixels and channels.
+fn row_error(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> f64 {
+    let height = pixels.len() / width;
+    let rows = y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(height);
+    let column = |x| rows.clone().map(|row| Window::from(&pixels[row * width + x])).sum();
+    let columns: Vec<Window> = (0..width).map(column).collect();
+    let mut error = 0.0;
+    for (x, pixel) in pixels[y * width..][..width].iter().enumerate() {
+        let Some(pixel) = pixel else { continue };
+        // plain sums, not running ones: next to a very bright pixel those would keep its rounding error
+        let near = &columns[x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width)];
+        let window: Window = near.iter().copied().sum();
+        let (mean, variance) = (pixel.mean.as_dvec3(), pixel.variance.as_dvec3());
+        let smooth = window.mean / window.count;
+        let excess = mean - smooth;
+        // one pixel's estimate of variance is often far too small
+        let noise = variance.max(window.variance / window.count);
+        // share of the squared difference that noise does not explain; no difference, nothing to draw back
+        let trust = (1.0 - noise / (excess * excess).max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO);
+        let truth = smooth + trust * excess;
+        error += (variance / (truth * truth + floor)).element_sum();
+    }
+    error
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Film, PassSet, Sample};
+    use crate::math::sampler::{hash, hash_unit};
+
+    const SIZE: (u32, u32) = (160, 120);
+
+    /// Factor of mean one that a sample's radiance is multiplied with.
+    #[derive(Clone, Copy, Debug)]
+    enum Noise {
+        Uniform,
+        Exponential,
+        /// Almost always nothing, else very bright.
+        Fireflies(f32),
+    }
+
+    impl Noise {
+        fn factor(self, u: f32) -> f32 {
+            match self {
+                Noise::Uniform => 2.0 * u,
+                Noise::Exponential => -(1.0 - u).ln(),
+                Noise::Fireflies(rate) if u < rate => 1.0 / rate,
+                Noise::Fireflies(_) => 0.0,
+            }
+        }
+
+        fn variance(self) -> f64 {
+            match self {
+                Noise::Uniform => 1.0 / 3.0,
+                Noise::Exponential => 1.0,
+                Noise::Fireflies(rate) => 1.0 / rate as f64 - 1.0,
+            }
+        }
+    }
+
+    /// Constant.
+    fn flat(_: u32, _: u32) -> Vec3 {
+        Vec3::new(0.2, 0.5, 0.9)
+    }
+
+    /// Three decades from left to right.
+    fn ramp(x: u32, _: u32) -> Vec3 {
+        Vec3::new(1.0, 0.7, 0.4) * 10f32.powf(3.0 * x as f32 / SIZE.0 as f32)
+    }
+
+    /// The left half sees no light at all.
+    fn half_black(x: u32, y: u32) -> Vec3 {
+        if x < SIZE.0 / 2 { Vec3::ZERO } else { flat(x, y) }
+    }
+
+    /// Squares of ten pixels, a hundredfold apart, and thin lines brighter still.
+    fn edges(x: u32, y: u32) -> Vec3 {
+        let square = if (x / 10 + y / 10).is_multiple_of(2) { 1.0 } else { 0.01 };
+        let bright = if x.is_multiple_of(37) { 20.0 } else { square };
+        Vec3::splat(bright)
+    }
+
+    /// Estimate, and the expectation of what it estimates, of a picture of `count(x, y)` samples a pixel.
+    fn estimated_and_true(
+        truth: fn(u32, u32) -> Vec3,
+        noise: Noise,
+        count: impl Fn(u32, u32) -> u32 + Sync,
+    ) -> (f64, f64) {
+        let film = Film::new(SIZE.0, SIZE.1, PassSet::default()).unwrap();
+        film.par_tiles().for_each(|shared| {
+            let mut tile = shared.lock();
+            for (x, y) in shared.rect().pixels() {
+                for i in 0..count(x, y) {
+                    let factor = |channel| noise.factor(hash_unit(hash(x * 8191 + y, i), channel));
+                    let radiance = truth(x, y) * Vec3::new(factor(0), factor(1), factor(2));
+                    tile.add(x, y, &Sample { radiance, alpha: 1.0, ..Default::default() });
+                }
+            }
+        });
+        let known: Vec<_> = film.rect().pixels().filter(|&(x, y)| count(x, y) > 1).collect();
+        let channels = 3.0 * known.len() as f64;
+        let sum = known.iter().map(|&(x, y)| truth(x, y).as_dvec3().element_sum()).sum::<f64>();
+        let floor = (0.01 * sum / channels).powi(2);
+        let error = |&(x, y): &(u32, u32)| {
+            let square = truth(x, y).as_dvec3().powf(2.0);
+            (square * noise.variance() / count(x, y) as f64 / (square + floor)).element_sum()
+        };
+        (film.estimated_relmse().unwrap(), known.iter().map(error).sum::<f64>() / channels)
+    }
+
+    fn check(name: &str, truth: fn(u32, u32) -> Vec3, noise: Noise, count: impl Fn(u32, u32) -> u32 + Sync) {
+        let (estimated, expected) = estimated_and_true(truth, noise, count);
+        let ratio = estimated / expected;
+        assert!(
+            (0.9..1.1).contains(&ratio),
+            "{name}, {noise:?}: {estimated}, should be {expected} ({ratio})"
+        );
+    }
+
+    #[test]
+    fn known_noise_is_estimated_within_a_tenth() {
+        let noises = [
+            (Noise::Uniform, 2),
+            (Noise::Uniform, 16),
+            (Noise::Exponential, 4),
+            (Noise::Exponential, 64),
+            (Noise::Fireflies(0.01), 64),
+            (Noise::Fireflies(0.02), 512),
+        ];
+        for (noise, n) in noises {
+            check("flat", flat, noise, |_, _| n);
+            check("ramp", ramp, noise, |_, _| n);
+            check("half black", half_black, noise, |_, _| n);
+        }
+    }
+
+    #[test]
+    fn edges_and_thin_lines_are_not_smoothed_away() {
+        check("edges", edges, Noise::Uniform, |_, _| 16);
+        check("edges", edges, Noise::Exponential, |_, _| 64);
+        check("edges", edges, Noise::Fireflies(0.02), |_, _| 1024);
+    }
+
+    #[test]
+    fn pixels_may_have_different_counts() {
+        check("odd counts", ramp, Noise::Exponential, |_, _| 5);
+        check("mixed counts", ramp, Noise::Exponential, |x, y| 2 + hash(x, y) % 20);
+        check("cut short", flat, Noise::Exponential, |_, y| if y < 50 { 8 } else { y % 2 });
+    }
+
+    #[test]
+    fn nothing_known_and_nothing_seen() {
+        let film = Film::new(40, 40, PassSet::default()).unwrap();
+        assert_eq!(film.estimated_relmse(), None);
+        film.add_iteration(|_, _| Sample::default());
+        assert_eq!(film.estimated_relmse(), None);
+        film.add_iteration(|_, _| Sample::default());
+        assert_eq!(film.estimated_relmse(), Some(0.0));
+        let one = Film::new(1, 1, PassSet::default()).unwrap();
+        (0..2).for_each(|_| one.add_iteration(|_, _| Sample { radiance: Vec3::ONE, ..Default::default() }));
+        assert_eq!(one.estimated_relmse(), Some(0.0));
+    }
+
+    #[test]
+    fn the_largest_values_do_not_overflow() {
+        let film = Film::new(16, 16, PassSet::default()).unwrap();
+        for i in 0..2 {
+            let value = |x| if (x + i) % 2 == 0 { f32::MAX } else { 0.0 };
+            film.add_iteration(|x, _| Sample { radiance: Vec3::splat(value(x)), ..Default::default() });
+        }
+        assert!(film.estimated_relmse().unwrap().is_finite());
+    }
+
+    #[test]
+    fn a_bright_pixel_leaves_no_trace_beyond_its_neighbourhood() {
+        let pixel =
+            |value, variance| Some(Pixel { mean: Vec3::splat(value), variance: Vec3::splat(variance) });
+        let mut row = vec![pixel(0.1, 0.01); 40];
+        row[..8].fill(None);
+        let without = row_error(&row, 40, 0, 1e-4);
+        row[0] = pixel(1e30, 0.0);
+        assert_eq!(row_error(&row, 40, 0, 1e-4), without);
+    }
+
+    #[test]
+    fn the_estimate_does_not_depend_on_the_number_of_threads() {
+        let film = Film::new(150, 90, PassSet::default()).unwrap();
+        for i in 0..4 {
+            film.add_iteration(|x, y| Sample {
+                radiance: Vec3::splat(hash_unit(hash(x, y), i)),
+                ..Default::default()
+            });
+        }
+        let ask = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| film.estimated_relmse().unwrap())
+        };
+        assert_eq!(ask(1).to_bits(), ask(5).to_bits());
+    }
+}
