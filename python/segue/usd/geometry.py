@@ -168,8 +168,7 @@ class Geometry:
 
     def _surface(self, slot: Usd.Prim, prim: Usd.Prim, data: meshes.MeshData) -> Surface:
         """The surface of a material slot: what is bound, else displayColor and displayOpacity."""
-        material = self._materials.bound(slot)
-        surface = self._materials.surface(material) if material else None
+        surface = self._materials.bound_surface(slot)
         if surface is not None:
             return surface
         color = self._display(prim, "displayColor", data, [GREY] * 3)

@@ -44,6 +44,10 @@ def instance_transforms(
             "left out",
         )
         return []
+    for found in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues():
+        if found.GetInterpolation() in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying):
+            name = found.GetPrimvarName()
+            report.unsupported(prim, f"values of '{name}' for each instance", "they are ignored")
     rows = np.array(matrices, dtype=np.float64).reshape(-1, 4, 4)
     keep = mask if len(mask) == len(indices) else np.ones(len(indices), bool)
     known = (indices >= 0) & (indices < len(targets))

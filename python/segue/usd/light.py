@@ -205,7 +205,7 @@ class Lights:
             "type": "rect",
             "width": width,
             "height": height,
-            "radiance": list(self._normalized(light, level, area)),
+            "radiance": self._normalized(light, level, area).tolist(),
             "transform": flat(matrix),
         }
         image = self._textures.light_image(prim.GetAttribute("inputs:texture:file"))
@@ -223,7 +223,7 @@ class Lights:
         return {
             "type": "disk",
             "radius": radius,
-            "radiance": list(self._normalized(light, level, area)),
+            "radiance": self._normalized(light, level, area).tolist(),
             "transform": flat(matrix),
         }
 
@@ -239,11 +239,11 @@ class Lights:
             intensity = level / 4 * (1.0 if normalized else area)
             if not intensity.any():
                 return self._no_area(prim)
-            return {"type": "point", "intensity": list(intensity), "transform": flat(matrix)}
+            return {"type": "point", "intensity": intensity.tolist(), "transform": flat(matrix)}
         return {
             "type": "sphere",
             "radius": radius,
-            "radiance": list(self._normalized(light, level, area)),
+            "radiance": self._normalized(light, level, area).tolist(),
             "transform": flat(matrix),
         }
 
@@ -262,7 +262,7 @@ class Lights:
             "type": "cylinder",
             "radius": radius,
             "length": length,
-            "radiance": list(self._normalized(light, level, area)),
+            "radiance": self._normalized(light, level, area).tolist(),
             "transform": flat(matrix),
         }
 
@@ -281,7 +281,7 @@ class Lights:
         return {
             "type": "distant",
             "angle": angle,
-            "irradiance" if parallel else "radiance": list(level),
+            "irradiance" if parallel else "radiance": level.tolist(),
             "transform": flat(without_scale(matrix)[0]),
         }
 
@@ -300,7 +300,7 @@ class Lights:
         if axis == "Z" or (axis == "scene" and self._z_up):
             orientation = orientation @ _POLE_TO_Z
         orientation[:3, 3] = 0
-        description = {"type": "dome", "radiance": list(level), "transform": flat(orientation)}
+        description = {"type": "dome", "radiance": level.tolist(), "transform": flat(orientation)}
         if image is not None:
             description["image"] = image
         return description

@@ -8,7 +8,7 @@ from typing import Any
 from ..scene import Scene
 from ._pxr import Sdf, Usd, UsdShade
 from .report import Report
-from .texture import COLOR_READERS, Textures, source
+from .texture import COLOR_READERS, Textures, floats, source
 
 #: A parameter of the ABI: a number, a colour or a texture's output.
 Value = Any
@@ -112,7 +112,7 @@ class _Inputs:
         """1 where the input reaches the threshold, else 0."""
         found = source(self.node, name, self._time)
         if not isinstance(found, tuple):
-            number = 1.0 if found is None else float(found)
+            number = floats(found, (1.0,))[0]
             return 1.0 if number >= threshold else 0.0
         node, output = found
         if node.GetIdAttr().Get() != "UsdUVTexture":
@@ -151,8 +151,8 @@ class _Inputs:
             return default
         if not isinstance(found, tuple):
             if plain == "r":
-                return float(found)
-            numbers = [float(v) for v in found] if hasattr(found, "__len__") else [float(found)] * 3
+                return floats(found, (default,))[0]
+            numbers = floats(found, (default,) * 3)
             return numbers[0] if numbers[0] == numbers[1] == numbers[2] else numbers
         node, output = found
         kind = node.GetIdAttr().Get()
@@ -190,13 +190,9 @@ def read_surface(
     node = material.ComputeSurfaceSource()[0]
     kind = node.GetIdAttr().Get() if node else None
     if kind not in PREVIEW_SURFACES:
-        others = [o.GetBaseName() for o in material.GetSurfaceOutputs() if o.HasConnectedSource()]
-        alternative = material.ComputeSurfaceSource(["mtlx"])[0] if others else None
-        other = alternative.GetIdAttr().Get() if alternative else None
-        if other in PREVIEW_SURFACES:
-            node = alternative
-        else:
-            found = kind or other or ", ".join(others)
+        node, other = _other_context(material)
+        if node is None:
+            found = kind or other
             what = f"the surface '{found}'" if found else "a material without a surface"
             report.unsupported(prim, what, "displayColor or grey 0.18 is used")
             return None
@@ -211,10 +207,24 @@ def read_surface(
     return _surface(_Inputs(node, textures, time, report), report)
 
 
+def _other_context(material: UsdShade.Material) -> tuple[UsdShade.Shader | None, str]:
+    """A node like UsdPreviewSurface on another render context's output, and what else is there."""
+    kinds = []
+    for output in material.GetSurfaceOutputs():
+        context = output.GetBaseName().rpartition(":")[0]
+        node = material.ComputeSurfaceSource(context)[0] if context else None
+        kind = node.GetIdAttr().Get() if node else None
+        if kind in PREVIEW_SURFACES:
+            return node, kind
+        if context:
+            kinds.append(str(kind or context))
+    return None, ", ".join(kinds)
+
+
 def _surface(inputs: _Inputs, report: Report) -> Surface:
     opaque = _opaque_closure(inputs)
     emission = inputs.color("emissiveColor", 0.0)
-    threshold = float(inputs.constant("opacityThreshold", 0.0))
+    threshold = floats(inputs.constant("opacityThreshold", 0.0), (0.0,))[0]
     mode = str(inputs.constant("opacityMode", "transparent"))
     presence: Value = 1
     closure = opaque
@@ -320,10 +330,19 @@ class Materials:
         self._display: dict[str, int] = {}
         self._ids: dict[str, int] = {}
 
-    def bound(self, prim: Usd.Prim) -> UsdShade.Material | None:
-        """The material bound to a prim for full renders: direct, by collection or inherited."""
-        material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(UsdShade.Tokens.full)
-        return material if material else None
+    def bound_surface(self, prim: Usd.Prim) -> Surface | None:
+        """The surface bound to a prim: directly, by collection, or inherited.
+
+        The binding for full renders counts; where that has no surface that we can draw, the one
+        for previews.
+        """
+        binding = UsdShade.MaterialBindingAPI(prim)
+        for purpose in (UsdShade.Tokens.full, UsdShade.Tokens.preview):
+            material, _ = binding.ComputeBoundMaterial(purpose)
+            surface = self.surface(material) if material else None
+            if surface is not None:
+                return surface
+        return None
 
     def surface(self, material: UsdShade.Material) -> Surface | None:
         """A material's surface, read once."""

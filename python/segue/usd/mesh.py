@@ -44,9 +44,12 @@ class MeshData:
 def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, report: Report) -> MeshData | None:
     """A mesh without its attributes, or None, with an entry in the report, if it has no shape."""
     prim = mesh.GetPrim()
-    points = np.asarray(mesh.GetPointsAttr().Get(time) or np.zeros((0, 3)), np.float32)
-    counts = np.asarray(mesh.GetFaceVertexCountsAttr().Get(time) or (), np.int64)
-    indices = np.asarray(mesh.GetFaceVertexIndicesAttr().Get(time) or (), np.int64)
+    points = numbers(mesh.GetPointsAttr(), time, 3)
+    counts = numbers(mesh.GetFaceVertexCountsAttr(), time)
+    indices = numbers(mesh.GetFaceVertexIndicesAttr(), time)
+    if points is None or counts is None or indices is None:
+        report.warning(prim, "a mesh whose points or faces are of a wrong type", "left out")
+        return None
     if not len(points) or not len(counts):
         report.left_out(prim, "a mesh without points or faces")
         return None
@@ -60,8 +63,8 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, report: Report) -> MeshDat
         face_indices=indices.astype(np.uint32),
         left_handed=mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded,
     )
-    holes = np.asarray(mesh.GetHoleIndicesAttr().Get(time) or (), np.int64)
-    if len(holes):
+    holes = numbers(mesh.GetHoleIndicesAttr(), time)
+    if holes is not None and len(holes):
         inside = holes[(holes >= 0) & (holes < len(counts))]
         if len(inside) < len(holes):
             report.warning(prim, "holeIndices out of range", "they are ignored")
@@ -69,6 +72,24 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, report: Report) -> MeshDat
     _read_normals(mesh, time, data, report)
     _read_subsets(prim, time, data, report)
     return data
+
+
+def numbers(attribute: Usd.Attribute, time: Usd.TimeCode, width: int = 0) -> np.ndarray | None:
+    """An attribute's numbers: (n, width) float32, or (n,) int64 for a width of 0.
+
+    Empty where there is no value; None where the value is of another kind.
+    """
+    shape, dtype = ((0, width), np.float32) if width else ((0,), np.int64)
+    value = attribute.Get(time)
+    if value is None:
+        return np.zeros(shape, dtype)
+    array = np.asarray(value)
+    if array.ndim and not len(array):
+        return np.zeros(shape, dtype)
+    fits = array.ndim == len(shape) and array.shape[1:] == shape[1:]
+    if not fits or array.dtype.kind not in ("f" if width else "iu"):
+        return None
+    return array.astype(dtype)
 
 
 def _fault(points: np.ndarray, counts: np.ndarray, indices: np.ndarray) -> str:
@@ -117,10 +138,10 @@ def _read_normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, data: MeshData, report
 def _plain_normals(
     mesh: UsdGeom.Mesh, time: Usd.TimeCode, data: MeshData, report: Report
 ) -> primvar.Values | None:
-    raw = mesh.GetNormalsAttr().Get(time)
-    if raw is None:
+    normals = numbers(mesh.GetNormalsAttr(), time, 3)
+    if normals is None:
+        report.warning(mesh.GetPrim(), "normals of a wrong type", "it is drawn flat")
         return None
-    normals = np.asarray(raw, np.float32)
     interpolation = primvar.INTERPOLATION[mesh.GetNormalsInterpolation()]
     wanted = data.elements.of(interpolation)
     if len(normals) != wanted:
@@ -182,7 +203,10 @@ def _read_subsets(prim: Usd.Prim, time: Usd.TimeCode, data: MeshData, report: Re
                 subset.GetPrim(), f"a material subset of '{element}'", "it is ignored"
             )
             continue
-        faces = np.asarray(subset.GetIndicesAttr().Get(time) or (), np.int64)
+        faces = numbers(subset.GetIndicesAttr(), time)
+        if faces is None:
+            report.warning(subset.GetPrim(), "a subset without face indices", "it is ignored")
+            continue
         inside = faces[(faces >= 0) & (faces < len(slots))]
         if len(inside) < len(faces):
             report.warning(

@@ -65,7 +65,7 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     try:
         stage = Usd.Stage.Open(name)
     except Tf.ErrorException as error:
-        reasons = "; ".join(" ".join(str(e.commentary).split()) for e in error.args)
+        reasons = " ".join(str(error.args[0].commentary if error.args else error).split())
         raise StageError(f"{name} cannot be opened as USD: {reasons}") from None
     if not stage:
         raise StageError(f"{name} cannot be opened as USD")
@@ -141,8 +141,7 @@ def _fill(
     materials = Materials(scene, textures, time, report)
     lights = Lights(scene, textures, time, report, gain, z_up)
     geometry = Geometry(scene, materials, lights, time, report, gain)
-    walker = Walker(stage, time, purposes, report)
-    items = walker.items()
+    items = Walker(stage, time, purposes, report).items()
     geometry.geometry_lights = geometry_light_targets([i.prim for i in items])
     for item in items:
         if item.prim.GetTypeName() == "GeometryLight":
@@ -151,9 +150,6 @@ def _fill(
             lights.add(item.prim, item.transforms)
         else:
             geometry.add(item)
-    for what, number in sorted(walker.hidden.items()):
-        reason = "invisible" if what == "invisible" else f"of purpose '{what}'"
-        report.left_out("", f"{number} prims that are {reason}")
     if not lights.count and not geometry.emitters:
         report.note("", "the stage has no light", "a white sky of radiance 1 was added")
         scene.add_light("white sky", {"type": "dome", "radiance": [gain] * 3})
@@ -173,7 +169,7 @@ def _report_composition(stage: Usd.Stage, report: Report) -> None:
     if not hasattr(stage, "GetCompositionErrors"):
         return
     for error in stage.GetCompositionErrors():
-        report.warning(str(getattr(error, "rootSite", "")), " ".join(str(error).split()), "ignored")
+        report.warning("", " ".join(str(error).split()), "ignored")
 
 
 __all__ = ["Frame", "Imported", "StageError", "load", "open_stage"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,20 @@ def value(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: Any) 
     """An input that cannot be connected to a texture: its value, or the default."""
     found = source(shader, name, time)
     return default if found is None or isinstance(found, tuple) else found
+
+
+def floats(found: Any, default: Sequence[float]) -> list[float]:
+    """A value as as many numbers as the default has, whatever type it was authored with.
+
+    One number counts for all (but not for the alpha of four), missing ones come from the default.
+    """
+    try:
+        given = [float(v) for v in np.atleast_1d(np.asarray(found, dtype=np.float64)).ravel()]
+    except (TypeError, ValueError):
+        return list(default)
+    if len(given) == 1:
+        given *= min(len(default), 3)
+    return (given + list(default)[len(given) :])[: len(default)]
 
 
 @dataclass(frozen=True)
@@ -124,12 +139,7 @@ class Textures:
         name = self._primvar_name(shader)
         if not name:
             return None
-        fallback = value(shader, "fallback", self._time, None)
-        numbers = [0.0] * 3 if fallback is None else np.atleast_1d(np.asarray(fallback, float))
-        numbers = [float(v) for v in numbers]
-        if len(numbers) == 1:
-            numbers *= 3
-        numbers = (numbers + [0.0] * 3)[:3] + ([numbers[3]] if len(numbers) > 3 else [1.0])
+        numbers = floats(value(shader, "fallback", self._time, 0.0), (0.0, 0.0, 0.0, 1.0))
         texture = self._scene.add_texture(
             str(shader.GetPath()), {"type": "attribute", "name": name, "default": numbers}
         )
@@ -150,8 +160,8 @@ class Textures:
         self, shader: UsdShade.Shader, normal_map: bool, threshold: float | None, channel: str
     ) -> ImageTexture:
         prim, time = shader.GetPrim(), self._time
-        scale = [float(v) for v in value(shader, "scale", time, (1, 1, 1, 1))]
-        bias = [float(v) for v in value(shader, "bias", time, (0, 0, 0, 0))]
+        scale = floats(value(shader, "scale", time, 1), (1.0, 1.0, 1.0, 1.0))
+        bias = floats(value(shader, "bias", time, 0), (0.0, 0.0, 0.0, 0.0))
         file_attribute = self._producer(shader, "file")
         asset = file_attribute.Get(time) if file_attribute else None
         space = str(value(shader, "sourceColorSpace", time, "auto"))
@@ -161,7 +171,7 @@ class Textures:
             loaded = self._load(file_attribute, asset, space, mask)
         if isinstance(loaded, str):
             fallback = value(shader, "fallback", time, None)
-            numbers = MISSING if fallback is None else tuple(float(v) for v in fallback)
+            numbers = MISSING if fallback is None else tuple(floats(fallback, (0, 0, 0, 1)))
             word = "its fallback value is used" if fallback is not None else "grey 0.5 is used"
             self._report.warning(prim, loaded, word)
             texture = self._scene.add_texture(
@@ -221,7 +231,7 @@ class Textures:
             if not isinstance(found, tuple):
                 if found is not None and node.GetInput(name).GetAttr().HasAuthoredValue():
                     # A constant coordinate: every point sees the same texel.
-                    constant = matrix @ np.array([float(found[0]), float(found[1]), 1.0])
+                    constant = matrix @ np.array([*floats(found, (0.0, 0.0)), 1.0])
                     matrix = np.zeros((3, 3))
                     matrix[:, 2] = constant
                 else:
@@ -246,14 +256,11 @@ class Textures:
 
     def _transform_2d(self, node: UsdShade.Shader) -> np.ndarray:
         """UsdTransform2d: scaled, then turned counter-clockwise, then moved."""
-        turn = math.radians(float(value(node, "rotation", self._time, 0.0)))
-        scale = value(node, "scale", self._time, (1, 1))
-        move = value(node, "translation", self._time, (0, 0))
+        turn = math.radians(floats(value(node, "rotation", self._time, 0), (0.0,))[0])
+        sx, sy = floats(value(node, "scale", self._time, 1), (1.0, 1.0))
+        tx, ty = floats(value(node, "translation", self._time, 0), (0.0, 0.0))
         c, s = math.cos(turn), math.sin(turn)
-        sx, sy = float(scale[0]), float(scale[1])
-        return np.array(
-            [[c * sx, -s * sy, float(move[0])], [s * sx, c * sy, float(move[1])], [0, 0, 1]]
-        )
+        return np.array([[c * sx, -s * sy, tx], [s * sx, c * sy, ty], [0.0, 0.0, 1.0]])
 
     def _primvar_name(self, node: UsdShade.Shader) -> str:
         name = value(node, "varname", self._time, "")

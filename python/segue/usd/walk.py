@@ -65,7 +65,6 @@ class Walker:
         self._prototypes: dict[tuple, list[Item]] = {}
         self._inherited: dict[Any, tuple] = {}
         self._open: list[Any] = []
-        self._hidden: dict[str, int] = {}
 
     def items(self) -> list[Item]:
         """The drawn prims, each once, with all its transformations, in stage order."""
@@ -82,16 +81,11 @@ class Walker:
             for same in merged.values()
         ]
 
-    @property
-    def hidden(self) -> dict[str, int]:
-        """How many subtrees or prims were not drawn: by purpose, and "invisible"."""
-        return self._hidden
-
     def _visit(self, prim: Usd.Prim, state: _State, predicate: Any, found: list[Item]) -> None:
         imageable = UsdGeom.Imageable(prim)
         if imageable:
             if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
-                self._hidden["invisible"] = self._hidden.get("invisible", 0) + 1
+                self._report.left_out(prim, "invisible")
                 return
             state = self._with_purpose(imageable, state)
         xformable = UsdGeom.Xformable(prim)
@@ -103,10 +97,10 @@ class Walker:
             self._instance(prim, state, predicate, found)
             return
         if prim.IsA(UsdGeom.PointInstancer):
-            if self._is_drawn(state):
+            if self._is_drawn(prim, state):
                 self._point_instancer(prim, state, found)
             return
-        if _is_drawable(prim) and self._is_drawn(state):
+        if _is_drawable(prim) and self._is_drawn(prim, state):
             found.append(Item(prim, column_matrix(state.matrix)[None], state.absolute))
         for child in prim.GetFilteredChildren(predicate):
             self._visit(child, state, predicate, found)
@@ -120,10 +114,10 @@ class Walker:
             return _State(state.matrix, state.absolute, "default", False)
         return state
 
-    def _is_drawn(self, state: _State) -> bool:
+    def _is_drawn(self, prim: Usd.Prim, state: _State) -> bool:
         if state.purpose in self._purposes:
             return True
-        self._hidden[state.purpose] = self._hidden.get(state.purpose, 0) + 1
+        self._report.left_out(prim, f"of purpose '{state.purpose}'")
         return False
 
     def _instance(self, prim: Usd.Prim, state: _State, predicate: Any, found: list[Item]) -> None:
@@ -154,9 +148,9 @@ class Walker:
         parent = prim.GetParent()
         above = self._inherited_by(parent) if parent and not parent.IsPseudoRoot() else ()
         own: list = []
-        for relationship in prim.GetAuthoredPropertiesInNamespace("material:binding"):
-            if isinstance(relationship, Usd.Relationship):
-                name = relationship.GetName()
+        for relationship in prim.GetAuthoredPropertiesInNamespace("material"):
+            name = relationship.GetName()
+            if name.startswith("material:binding") and isinstance(relationship, Usd.Relationship):
                 strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
                 targets = tuple(relationship.GetTargets())
                 # A collection's members are given by path: no two instances are alike.
