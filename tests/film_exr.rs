@@ -135,8 +135,10 @@ fn a_crop_sits_in_its_place_of_the_full_picture() {
     assert_eq!((red[0], green[0]), (3.0, 4.0));
     assert_eq!((red[119], green[119]), (12.0, 15.0));
 
-    let outside = ExrOptions { full_size: Some([60, 100]), offset: [20, 30], ..Default::default() };
-    assert!(matches!(film.exr_bytes(film.rect(), &outside), Err(FilmError::Window { .. })));
+    for (full, offset) in [([60, 100], [20, 30]), ([u32::MAX, 100], [u32::MAX - 50, 30])] {
+        let outside = ExrOptions { full_size: Some(full), offset, ..Default::default() };
+        assert!(matches!(film.exr_bytes(film.rect(), &outside), Err(FilmError::Window { .. })));
+    }
     assert!(matches!(film.exr_bytes(Rect::new(0, 0, 51, 1), &options), Err(FilmError::Rect { .. })));
 }
 

@@ -68,8 +68,8 @@ pub enum FilmError {
         /// What is wrong with it.
         reason: &'static str,
     },
-    /// The crop does not lie in the full picture.
-    #[error("{data} is not inside the full picture of {width} x {height} pixels")]
+    /// The crop does not lie in the full picture, or that is larger than OpenEXR's coordinates reach.
+    #[error("{data} is not inside the full picture of {width} x {height} pixels, or that is too large")]
     Window {
         /// The film's place in the full picture.
         data: Rect,

@@ -124,7 +124,9 @@ impl Film {
         let [x, y] = options.offset;
         let [width, height] = options.full_size.unwrap_or([self.width(), self.height()]);
         let film = Rect::new(x, y, self.width(), self.height());
-        if !film.is_inside(width, height) {
+        // the format's coordinates are signed
+        let addressable = i32::try_from(width.max(height)).is_ok();
+        if !(addressable && film.is_inside(width, height)) {
             return Err(FilmError::Window { data: film, width, height });
         }
 
