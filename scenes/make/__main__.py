@@ -8,6 +8,7 @@ from pathlib import Path
 
 NAMES = [
     "glass_caustic",
+    "lamp",
     "pool",
     "still_life",
 ]
