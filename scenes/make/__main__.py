@@ -8,6 +8,8 @@ from pathlib import Path
 
 NAMES = [
     "glass_caustic",
+    "door_ajar",
+    "glossy_room",
     "lamp",
     "pool",
     "still_life",

@@ -84,6 +84,11 @@ class Mesh:
         a, b, c = (self.points[tri[:, i]] for i in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
+    def faceted(self) -> Mesh:
+        """The mesh with flat faces: no shading normals, coincident points made one, no uv."""
+        points, place = self.welded()
+        return Mesh(points, self.counts, place[self.indices])
+
     def smooth(self, crease: float = 40.0) -> Mesh:
         """The mesh with shading normals, averaged over faces that meet at less than `crease` degrees.
 

@@ -210,11 +210,13 @@ def _inset(outline: Array, distance: float) -> Array:
     return outline + distance * corner
 
 
-def gear_outline(teeth: int, root: float, tip: float, samples: int = 8) -> Array:
-    """Outline of a spur gear with trapezoid teeth, counter-clockwise, `samples` points a tooth."""
-    phase = np.linspace(0, 1, samples, endpoint=False)
-    height = np.interp(phase, [0.0, 0.18, 0.32, 0.68, 0.82, 1.0], [0, 0, 1, 1, 0, 0])
-    radius = np.tile(root + (tip - root) * height, teeth)
+def gear_outline(teeth: int, root: float, tip: float) -> Array:
+    """Outline of a spur gear with trapezoid teeth of four corners each, counter-clockwise.
+
+    The first tooth is centred on the x axis.
+    """
+    phase = np.array([-0.32, -0.18, 0.18, 0.32])
+    radius = np.tile([root, tip, tip, root], teeth)
     angle = 2 * np.pi * (np.arange(teeth)[:, None] + phase).ravel() / teeth
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
