@@ -28,7 +28,9 @@ class SegueRenderEngine(bpy.types.RenderEngine):
         """Tell the compositor which passes a view layer will have."""
         for render_pass in passes.enabled(renderlayer):
             channels = render_pass.channels
-            self.register_pass(scene, renderlayer, render_pass.name, len(channels), channels, render_pass.kind)
+            self.register_pass(
+                scene, renderlayer, render_pass.name, len(channels), channels, render_pass.kind
+            )
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Render one view layer.

@@ -46,7 +46,9 @@ class Frame:
             return [""]
         return [view.name for view in self.engine.get_result().views]
 
-    def write(self, pixels: dict[str, np.ndarray], *, view: str, origin: tuple[int, int] = (0, 0)) -> None:
+    def write(
+        self, pixels: dict[str, np.ndarray], *, view: str, origin: tuple[int, int] = (0, 0)
+    ) -> None:
         """Merge passes by Blender's names, all of one size, with their top left corner at `origin`.
 
         Passes that are not given become black; with no pass at all the whole frame does.
@@ -72,7 +74,9 @@ class Frame:
 class _Monitor:
     """Carries progress to Blender and the user's wish to stop back to the render."""
 
-    def __init__(self, engine: SegueRenderEngine, frame: Frame, render: Any, view: str, span: tuple[int, int]) -> None:
+    def __init__(
+        self, engine: SegueRenderEngine, frame: Frame, render: Any, view: str, span: tuple[int, int]
+    ) -> None:
         self.engine = engine
         self.frame = frame
         self.render = render
@@ -80,7 +84,9 @@ class _Monitor:
         self.index, self.count = span
         self.dirty: tuple[int, int, int, int] | None = None
         # Nobody watches a render without a window.
-        self.next_display = float("inf") if bpy.app.background else time.monotonic() + _FIRST_DISPLAY
+        self.next_display = (
+            float("inf") if bpy.app.background else time.monotonic() + _FIRST_DISPLAY
+        )
 
     def progress(self, state: dict[str, Any]) -> bool:
         """Called by the render, at least ten times a second; true asks it to stop."""
@@ -132,7 +138,9 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
     view_layer = depsgraph.view_layer_eval
     names = passes.unsupported(view_layer)
     if names:
-        log.warn(f"View layer '{view_layer.name}': no such passes in Segue, left out: {', '.join(names)}")
+        log.warn(
+            f"View layer '{view_layer.name}': no such passes in Segue, left out: {', '.join(names)}"
+        )
 
     engine.update_stats(frame.layer, "Exporting the scene")
     scene = export_scene(segue, depsgraph, log, engine.stop_requested)
@@ -162,7 +170,9 @@ def _read_passes(render: Any, frame: Frame) -> dict[str, np.ndarray]:
     for render_pass in frame.passes:
         values = render.read_pass(render_pass.source)
         if render_pass.background is not None:
-            values = np.where(np.isfinite(values) & (values > 0), values, np.float32(render_pass.background))
+            values = np.where(
+                np.isfinite(values) & (values > 0), values, np.float32(render_pass.background)
+            )
         pixels[render_pass.name] = values
     return pixels
 
@@ -180,6 +190,10 @@ def _finish(engine: SegueRenderEngine, frame: Frame, stats: dict[str, Any]) -> N
     """Leave the final figures in the status line and speak of pixels that went wrong."""
     mebibytes = stats.get("peak_memory_bytes", 0) / 2**20
     engine.update_memory_stats(memory_used=mebibytes, memory_peak=mebibytes)
-    engine.update_stats(frame.layer, f"{stats.get('samples', 0)} samples in {stats.get('seconds', 0.0):.2f} s")
+    engine.update_stats(
+        frame.layer, f"{stats.get('samples', 0)} samples in {stats.get('seconds', 0.0):.2f} s"
+    )
     if stats.get("non_finite"):
-        engine.report({"WARNING"}, f"Segue: {stats['non_finite']} samples were not finite and were dropped")
+        engine.report(
+            {"WARNING"}, f"Segue: {stats['non_finite']} samples were not finite and were dropped"
+        )

@@ -11,7 +11,11 @@ class EngineMissingError(RuntimeError):
 
 
 def load() -> ModuleType:
-    """The `segue` package with its library loaded, or an `EngineMissingError` that explains itself."""
+    """The `segue` package with its library loaded.
+
+    Raises:
+        EngineMissingError: it cannot be; the text says why.
+    """
     try:
         module = importlib.import_module("segue")
     except ImportError as error:

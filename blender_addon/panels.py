@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import bpy
 
 from .engine import SegueRenderEngine
@@ -45,6 +47,7 @@ class SEGUE_RENDER_PT_sampling(_Panel):
     bl_context = "render"
 
     def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender whenever the panel is shown."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -63,9 +66,10 @@ class SEGUE_RENDER_PT_film(_Panel):
 
     bl_label = "Film"
     bl_context = "render"
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender whenever the panel is shown."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -83,6 +87,7 @@ class SEGUE_VIEWLAYER_PT_passes(_Panel):
     bl_context = "view_layer"
 
     def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender whenever the panel is shown."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False

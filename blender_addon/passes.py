@@ -37,9 +37,19 @@ PASSES: tuple[RenderPass, ...] = (
     RenderPass("Position", "Position", "XYZ", "VECTOR", "use_pass_position"),
     RenderPass("Normal", "Normal", "XYZ", "VECTOR", "use_pass_normal"),
     RenderPass("UV", "UV", "UVA", "VECTOR", "use_pass_uv"),
-    RenderPass("ObjectIndex", "Object Index" if _LONG_NAMES else "IndexOB", "X", "VALUE", "use_pass_object_index"),
     RenderPass(
-        "MaterialIndex", "Material Index" if _LONG_NAMES else "IndexMA", "X", "VALUE", "use_pass_material_index"
+        "ObjectIndex",
+        "Object Index" if _LONG_NAMES else "IndexOB",
+        "X",
+        "VALUE",
+        "use_pass_object_index",
+    ),
+    RenderPass(
+        "MaterialIndex",
+        "Material Index" if _LONG_NAMES else "IndexMA",
+        "X",
+        "VALUE",
+        "use_pass_material_index",
     ),
     RenderPass("Emission", "Emission" if _LONG_NAMES else "Emit", "RGB", "COLOR", "use_pass_emit"),
     RenderPass("Albedo", "Albedo", "RGB", "COLOR", "use_pass_albedo", custom=True),
@@ -83,4 +93,8 @@ def enabled(view_layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
 def unsupported(view_layer: bpy.types.ViewLayer) -> list[str]:
     """Labels of the passes that are switched on and that Segue cannot render."""
     properties = view_layer.bl_rna.properties
-    return [properties[switch].name for switch in _UNSUPPORTED if switch in properties and getattr(view_layer, switch)]
+    return [
+        properties[switch].name
+        for switch in _UNSUPPORTED
+        if switch in properties and getattr(view_layer, switch)
+    ]

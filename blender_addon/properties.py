@@ -17,7 +17,8 @@ class SegueSceneSettings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Samples for every pixel. 0 means no limit: then set a time or a noise threshold",
+        description="Samples for every pixel. 0 means no limit: "
+        "then set a time or a noise threshold",
         default=128,
         min=0,
         soft_max=16384,
@@ -32,8 +33,8 @@ class SegueSceneSettings(bpy.types.PropertyGroup):
     )
     noise_threshold: FloatProperty(
         name="Noise Threshold",
-        description="Stop when the estimated relative mean squared error of the picture is below this. "
-        "0 means no threshold",
+        description="Stop when the estimated relative mean squared error of the picture is below "
+        "this. 0 means no threshold",
         default=0.0,
         min=0.0,
         max=1.0,

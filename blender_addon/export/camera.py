@@ -25,7 +25,9 @@ def camera_window(
     width, height = resolution
     ratio = pixel_aspect[1] / pixel_aspect[0]
     fit = camera.sensor_fit
-    horizontal = fit == "HORIZONTAL" or (fit == "AUTO" and pixel_aspect[0] * width >= pixel_aspect[1] * height)
+    horizontal = fit == "HORIZONTAL" or (
+        fit == "AUTO" and pixel_aspect[0] * width >= pixel_aspect[1] * height
+    )
     fitted = width if horizontal else ratio * height
     if camera.type == "ORTHO":
         size = camera.ortho_scale
@@ -90,11 +92,14 @@ def camera_json(
             result["blade_rotation"] = dof.aperture_rotation
             result["aperture_ratio"] = dof.aperture_ratio
         else:
-            log.warn(f"Camera '{camera_object.name}': the focus distance is 0, depth of field is left out")
+            name = camera_object.name
+            log.warn(f"Camera '{name}': the focus distance is 0, depth of field is left out")
     return result
 
 
-def export_camera(scene: Any, engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsgraph, log: ExportLog) -> None:
+def export_camera(
+    scene: Any, engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsgraph, log: ExportLog
+) -> None:
     """Set the camera of the engine's active view."""
     camera = engine.camera_override
     if camera is None or camera.type != "CAMERA":

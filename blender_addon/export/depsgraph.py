@@ -26,11 +26,21 @@ def export_scene(
     if found is None:
         return None
     translator = Translator(scene, log)
-    materials = [[translator.material(material) for material in group.traits.materials] for group in found.groups]
+    materials = [
+        [translator.material(material) for material in group.traits.materials]
+        for group in found.groups
+    ]
     if not _export_meshes(segue, scene, found, materials, translator, stop):
         return None
     for entry in found.lights:
-        data = light_json(entry.name, entry.light, found.matrices[entry.index], entry.camera_visible, translator, log)
+        data = light_json(
+            entry.name,
+            entry.light,
+            found.matrices[entry.index],
+            entry.camera_visible,
+            translator,
+            log,
+        )
         if data is not None:
             scene.add_light(entry.name, data)
     export_world(scene, depsgraph, translator, log)
@@ -78,6 +88,5 @@ def _warn_scene(depsgraph: bpy.types.Depsgraph, log: ExportLog) -> None:
     # Blender 5.0 made the working space a property of the file.
     space = getattr(bpy.data, "colorspace", None)
     if space is not None and space.working_space != "Linear Rec.709":
-        log.warn(
-            f"The working colour space is {space.working_space}, colours are rendered as if it were Linear Rec.709"
-        )
+        name = space.working_space
+        log.warn(f"The working colour space {name} is not supported, Linear Rec.709 is used")

@@ -52,7 +52,9 @@ def _colorspace(image: bpy.types.Image, log: ExportLog) -> str:
     if image.is_float:
         return "raw" if name in {"Non-Color", "Raw"} else "linear"
     if name not in _COLORSPACES:
-        log.warn(f"Image '{image.name}': colour space '{name}' is not supported, it is read as sRGB")
+        log.warn(
+            f"Image '{image.name}': colour space '{name}' is not supported, it is read as sRGB"
+        )
     return _COLORSPACES.get(name, "srgb")
 
 
@@ -66,9 +68,13 @@ def read_image(image: bpy.types.Image, log: ExportLog, *, straight_alpha: bool) 
     if width == 0 or height == 0:
         return None
     if image.source == "TILED":
-        log.warn(f"Image '{image.name}': UDIM tiles are not supported, the first tile is used everywhere")
+        log.warn(
+            f"Image '{image.name}': UDIM tiles are not supported, the first tile is used everywhere"
+        )
     elif image.source in {"SEQUENCE", "MOVIE"}:
-        log.warn(f"Image '{image.name}': image sequences are not supported, the frame now loaded is used")
+        log.warn(
+            f"Image '{image.name}': image sequences are not supported, the frame now loaded is used"
+        )
     values = np.empty(4 * width * height, np.float32)
     image.pixels.foreach_get(values)
     values = values.reshape(height, width, 4)[::-1]

@@ -22,11 +22,11 @@ _RAY_FLAGS = {
 }
 
 _UNSUPPORTED_TYPES = {
-    "CURVES": "hair curves",
-    "POINTCLOUD": "a point cloud",
-    "VOLUME": "a volume",
-    "GPENCIL": "grease pencil",
-    "GREASEPENCIL": "grease pencil",
+    "CURVES": "hair curves are",
+    "POINTCLOUD": "point clouds are",
+    "VOLUME": "volumes are",
+    "GPENCIL": "grease pencil is",
+    "GREASEPENCIL": "grease pencil is",
 }
 
 
@@ -42,7 +42,10 @@ class ObjectTraits:
 
 @dataclass
 class Group:
-    """Instances of one mesh that share materials and visibility; `members` index the depsgraph's list."""
+    """Instances of one mesh that share materials and visibility.
+
+    `members` are indices into the depsgraph's list.
+    """
 
     traits: ObjectTraits
     mesh: bpy.types.Mesh
@@ -74,27 +77,34 @@ def _camera_visible(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> 
     return item.visible_camera and not original.indirect_only_get(view_layer=view_layer)
 
 
+def _visible(item: bpy.types.Object) -> bool:
+    """Whether an object is seen by rays of any kind."""
+    return item.visible_camera or any(getattr(item, flag) for flag in _RAY_FLAGS)
+
+
 def _warn_object(item: bpy.types.Object, view_layer: bpy.types.ViewLayer, log: ExportLog) -> None:
     """Name what an object asks for and Segue lacks."""
+    name = f"Object '{item.name}'"
     hidden = [label for flag, label in _RAY_FLAGS.items() if not getattr(item, flag)]
     if hidden:
         log.warn(
-            f"Object '{item.name}': it stays visible to {', '.join(hidden)} rays, Segue hides from the camera only"
+            f"{name}: only the camera can be kept from seeing an object, "
+            f"it stays visible to {', '.join(hidden)} rays"
         )
     if item.type != "LIGHT" and item.is_shadow_catcher:
-        log.warn(f"Object '{item.name}': shadow catchers are not supported, it is rendered as it is")
+        log.warn(f"{name}: shadow catchers are not supported, it is rendered as it is")
     if item.is_holdout or item.original.holdout_get(view_layer=view_layer):
-        log.warn(f"Object '{item.name}': holdouts are not supported, it is rendered as it is")
+        log.warn(f"{name}: holdouts are not supported, it is rendered as it is")
     linking = item.light_linking
     if linking.receiver_collection or linking.blocker_collection:
-        log.warn(f"Object '{item.name}': light linking is not supported, it lights everything")
+        log.warn(f"{name}: light linking is not supported, it lights everything")
 
 
 def _warn_particles(item: bpy.types.Object, log: ExportLog) -> None:
     for system in item.particle_systems:
         settings = system.settings
         if settings.type == "HAIR" and settings.render_type == "PATH":
-            log.warn(f"Object '{item.name}': hair of particle system '{system.name}' is not supported, it is left out")
+            log.warn(f"Object '{item.name}': particle hair is not supported, it is left out")
 
 
 class _Surveyor:
@@ -116,6 +126,8 @@ class _Surveyor:
             return
         item = instance.object
         if item.type == "MESH":
+            if not _visible(item):
+                return
             parent = instance.parent if instance.is_instance else None
             key = (
                 item.original.as_pointer(),
@@ -131,7 +143,8 @@ class _Surveyor:
             visible = _camera_visible(item, self.view_layer)
             self.lights.append(LightInstance(item.name, item.data, visible, index))
         elif item.type in _UNSUPPORTED_TYPES:
-            self.log.warn(f"Object '{item.name}': {_UNSUPPORTED_TYPES[item.type]} is not supported, it is left out")
+            kind = _UNSUPPORTED_TYPES[item.type]
+            self.log.warn(f"Object '{item.name}': {kind} not supported, it is left out")
 
     def _warn_once(self, item: bpy.types.Object) -> None:
         pointer = item.original.as_pointer()
@@ -154,7 +167,9 @@ class _Surveyor:
         return self.groups.setdefault(key, Group(traits, item.data))
 
 
-def survey(depsgraph: bpy.types.Depsgraph, log: ExportLog, stop: Callable[[], bool]) -> Survey | None:
+def survey(
+    depsgraph: bpy.types.Depsgraph, log: ExportLog, stop: Callable[[], bool]
+) -> Survey | None:
     """List what is to be rendered; None when the user wants to stop."""
     entries = depsgraph.object_instances
     matrices = np.empty(16 * len(entries), np.float32)

@@ -41,16 +41,17 @@ def _pose(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _ball(light: bpy.types.Light, color: np.ndarray) -> dict[str, Any]:
     """Point and spot lights: a sphere, or a point where the radius is 0.
 
-    Blender's power P is that of the sphere seen as a whole: its intensity is P / (4 pi), hence its
-    radiance P / (4 pi^2 r^2).
+    Blender's power P means the radiance P / (4 pi^2 r^2). A point has the intensity of a sphere of
+    cross-section 1: P / (4 pi). Without normalisation the area of the sphere is left out.
     """
     radius = light.shadow_soft_size
-    normalized = getattr(light, "normalize", True)
-    intensity = color / (4.0 * math.pi)
-    if radius <= 0.0:
-        return {"type": "point", "intensity": intensity.tolist()}
-    area = math.pi * radius * radius if normalized else 1.0
-    return {"type": "sphere", "radius": radius, "radiance": (intensity / area).tolist()}
+    area = 1.0
+    if getattr(light, "normalize", True):
+        area = 4.0 * (math.pi * radius * radius if radius > 0.0 else 1.0)
+    emission = (color / (math.pi * area)).tolist()
+    if radius > 0.0:
+        return {"type": "sphere", "radius": radius, "radiance": emission}
+    return {"type": "point", "intensity": emission}
 
 
 def _sun(light: bpy.types.Light, color: np.ndarray) -> dict[str, Any]:
@@ -61,15 +62,16 @@ def _sun(light: bpy.types.Light, color: np.ndarray) -> dict[str, Any]:
     return {"type": "distant", "angle": angle, "radiance": color.tolist()}
 
 
-def _area(light: bpy.types.Light, color: np.ndarray, scale: np.ndarray) -> tuple[dict[str, Any], np.ndarray]:
+def _area(
+    light: bpy.types.Light, color: np.ndarray, scale: np.ndarray
+) -> tuple[dict[str, Any], np.ndarray]:
     """Area lights, and the scale that their transform keeps (an ellipse is a stretched disk)."""
     width = light.size * scale[0]
     height = (light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size) * scale[1]
     round_shape = light.shape in {"DISK", "ELLIPSE"}
     area = width * height * (math.pi / 4.0 if round_shape else 1.0)
-    # Blender's power is not that of a Lambertian emitter, P / (pi area), but P / (4 area).
     normalized = getattr(light, "normalize", True) and area > 0.0
-    radiance = color / (4.0 * area) if normalized else color / 4.0
+    radiance = color / (math.pi * (area if normalized else 1.0))
     result: dict[str, Any] = {"radiance": radiance.tolist()}
     stretch = np.ones(3)
     if round_shape:
@@ -83,13 +85,21 @@ def _area(light: bpy.types.Light, color: np.ndarray, scale: np.ndarray) -> tuple
 
 
 def light_json(
-    name: str, light: bpy.types.Light, matrix: np.ndarray, camera_visible: bool, translator: Translator, log: ExportLog
+    name: str,
+    light: bpy.types.Light,
+    matrix: np.ndarray,
+    camera_visible: bool,
+    translator: Translator,
+    log: ExportLog,
 ) -> dict[str, Any] | None:
     """The light object of the ABI; None for a light that emits nothing."""
     if light.type == "AREA" and getattr(getattr(light, "cycles", None), "is_portal", False):
         return None
     _warn(name, light, log)
     color = _color(light, translator)
+    if (color < 0.0).any():
+        log.warn(f"Light '{name}': negative light is not supported, that part is left out")
+        color = np.maximum(color, 0.0)
     pose, scale = _pose(matrix)
     if light.type == "SUN":
         result = _sun(light, color)

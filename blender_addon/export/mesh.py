@@ -56,9 +56,9 @@ class MeshArrays:
         if not self.triangle_count:
             return
         corner_count = len(mesh.loops)
-        self.points = _get(mesh.attributes["position"].data, "vector", 3 * len(mesh.vertices), np.float32).reshape(
-            -1, 3
-        )
+        self.points = _get(
+            mesh.attributes["position"].data, "vector", 3 * len(mesh.vertices), np.float32
+        ).reshape(-1, 3)
         corner_points = _get(mesh.attributes[".corner_vert"].data, "value", corner_count, np.int32)
         self.corners = _triangle_corners(mesh)
         self.indices = corner_points.astype(np.uint32)[self.corners]
@@ -89,7 +89,10 @@ class MeshArrays:
         """Every UV map as (name, values at the corners), the one rendered by default first."""
         layers = sorted(self.mesh.uv_layers, key=lambda layer: not layer.active_render)
         count = len(self.mesh.loops)
-        return [(layer.name, _get(layer.uv, "vector", 2 * count, np.float32).reshape(-1, 2)) for layer in layers]
+        return [
+            (layer.name, _get(layer.uv, "vector", 2 * count, np.float32).reshape(-1, 2))
+            for layer in layers
+        ]
 
     def attribute(self, name: str) -> tuple[np.ndarray, str, np.ndarray | None] | None:
         """A generic attribute as (values, interpolation, indices); None if there is none to use."""
@@ -97,7 +100,9 @@ class MeshArrays:
         if attribute is None or attribute.data_type not in _ATTRIBUTE_TYPES:
             return None
         member, width = _ATTRIBUTE_TYPES[attribute.data_type]
-        dtype = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}.get(attribute.data_type, np.float32)
+        dtype = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}.get(
+            attribute.data_type, np.float32
+        )
         values = _get(attribute.data, member, width * len(attribute.data), dtype).astype(np.float32)
         values = values.reshape(-1, width)
         if width == 1:
@@ -111,14 +116,18 @@ class MeshArrays:
         return None
 
 
-def export_mesh(segue: Any, scene: Any, mesh: bpy.types.Mesh, wanted: Collection[str]) -> int | None:
+def export_mesh(
+    segue: Any, scene: Any, mesh: bpy.types.Mesh, wanted: Collection[str]
+) -> int | None:
     """Add a mesh with its UV maps and the `wanted` attributes; None if it has no faces."""
     arrays = MeshArrays(mesh)
     if not arrays.triangle_count:
         return None
     normals, interpolation = arrays.normals()
     uv_maps = arrays.uv_maps()
-    attributes = [segue.Attribute(name, values, "corner", indices=arrays.corners) for name, values in uv_maps]
+    attributes = [
+        segue.Attribute(name, values, "corner", indices=arrays.corners) for name, values in uv_maps
+    ]
     names = {name for name, _ in uv_maps}
     for name in sorted(set(wanted) - names):
         found = arrays.attribute(name)

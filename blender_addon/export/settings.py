@@ -25,7 +25,9 @@ def render_settings(
     if preview:
         samples = min(samples or _PREVIEW_SAMPLES, _PREVIEW_SAMPLES)
     if not (samples or options.time_limit or options.noise_threshold):
-        raise ValueError("no samples, time limit or noise threshold is set: the render would never end")
+        raise ValueError(
+            "no samples, time limit or noise threshold is set: the render would never end"
+        )
     return {
         "integrator": options.integrator,
         "resolution": list(resolution),
@@ -48,7 +50,9 @@ def film_size(engine: bpy.types.RenderEngine) -> tuple[int, int]:
     return engine.resolution_x, engine.resolution_y
 
 
-def crop(render: bpy.types.RenderSettings, resolution: tuple[int, int], size: tuple[int, int]) -> list[int]:
+def crop(
+    render: bpy.types.RenderSettings, resolution: tuple[int, int], size: tuple[int, int]
+) -> list[int]:
     """The border as [x0, y0, x1, y1] from the top left; its size is what Blender allotted."""
     width, height = size
     if not render.use_border:

@@ -16,7 +16,9 @@ from ..nodes.values import AttributeValue, Constant, ImageValue
 _BLENDER_FROM_DOME = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-def world_json(world: bpy.types.World | None, translator: Translator, log: ExportLog) -> dict[str, Any] | None:
+def world_json(
+    world: bpy.types.World | None, translator: Translator, log: ExportLog
+) -> dict[str, Any] | None:
     """The dome light of a world; None for a black one."""
     if world is None:
         return None
@@ -27,11 +29,10 @@ def world_json(world: bpy.types.World | None, translator: Translator, log: Expor
     visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
     result: dict[str, Any] = {"type": "dome", "camera_visible": visible}
     if isinstance(value, ImageValue):
-        image = translator.textures.image(value.source)
-        if image is None:
+        if value.gain == 0.0:
             return None
-        result["radiance"] = [1.0, 1.0, 1.0]
-        result["image"] = image
+        result["radiance"] = [value.gain] * 3
+        result["image"] = translator.textures.image(value.source)
         result["transform"] = _dome_transform(world.name, value.sampling.matrix, log)
         return result
     assert not isinstance(value, AttributeValue)
@@ -50,13 +51,18 @@ def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> lis
         log.warn(f"World '{name}': the mapping of its image is flat, it is left out")
         u, vt = np.eye(3), np.eye(3)
     elif sizes[0] > sizes[-1] * (1.0 + 1e-4):
-        log.warn(f"World '{name}': a mapping that stretches the image is not supported, only its rotation is used")
+        log.warn(
+            f"World '{name}': a mapping that stretches the image is not supported, "
+            "only its rotation is used"
+        )
     transform = np.eye(4)
     transform[:3, :3] = (u @ vt).T @ _BLENDER_FROM_DOME
     return transform.ravel().tolist()
 
 
-def export_world(scene: Any, depsgraph: bpy.types.Depsgraph, translator: Translator, log: ExportLog) -> None:
+def export_world(
+    scene: Any, depsgraph: bpy.types.Depsgraph, translator: Translator, log: ExportLog
+) -> None:
     """Add the world of the view layer, if it shines."""
     view_layer = depsgraph.view_layer_eval
     if not view_layer.use_sky:

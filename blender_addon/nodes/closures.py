@@ -40,13 +40,20 @@ SHADERS: dict[str, Shader] = {
     "ShaderNodeBsdfDiffuse": Shader("diffuse", {"color": "Color", "roughness": "Roughness"}),
     "ShaderNodeBsdfAnisotropic": Shader(
         "glossy",
-        {"color": "Color", "roughness": "Roughness", "anisotropy": "Anisotropy", "rotation": "Rotation"},
+        {
+            "color": "Color",
+            "roughness": "Roughness",
+            "anisotropy": "Anisotropy",
+            "rotation": "Rotation",
+        },
         ignored=_TANGENT,
     ),
     "ShaderNodeBsdfGlass": Shader(
         "glass", {"color": "Color", "roughness": "Roughness", "ior": "IOR"}, ignored=_THIN_FILM
     ),
-    "ShaderNodeBsdfRefraction": Shader("refraction", {"color": "Color", "roughness": "Roughness", "ior": "IOR"}),
+    "ShaderNodeBsdfRefraction": Shader(
+        "refraction", {"color": "Color", "roughness": "Roughness", "ior": "IOR"}
+    ),
     "ShaderNodeBsdfTransparent": Shader("transparent", {"color": "Color"}, normals={}),
     "ShaderNodeBsdfTranslucent": Shader("translucent", {"color": "Color"}),
     "ShaderNodeBsdfSheen": Shader("sheen", {"color": "Color", "roughness": "Roughness"}),
@@ -62,8 +69,12 @@ SHADERS: dict[str, Shader] = {
         extra={"metallic": 1.0},
         ignored=_TANGENT | _THIN_FILM,
     ),
-    "ShaderNodeEmission": Shader("emission", {"color": "Color", "strength": "Strength"}, normals={}),
-    "ShaderNodeBackground": Shader("emission", {"color": "Color", "strength": "Strength"}, normals={}),
+    "ShaderNodeEmission": Shader(
+        "emission", {"color": "Color", "strength": "Strength"}, normals={}
+    ),
+    "ShaderNodeBackground": Shader(
+        "emission", {"color": "Color", "strength": "Strength"}, normals={}
+    ),
     "ShaderNodeSubsurfaceScattering": Shader("diffuse", {"color": "Color"}),
     "ShaderNodeBsdfPrincipled": Shader(
         "principled",
@@ -119,7 +130,11 @@ class ClosureTranslator:
         if source.output.type != "SHADER":
             # Blender shows a colour that is plugged into a shader input as emission.
             value = convert(self.ev.value(entry, stack), "color")
-            return {"type": "emission", "color": self.ev.textures.json(value, "color"), "strength": 1.0}
+            return {
+                "type": "emission",
+                "color": self.ev.textures.json(value, "color"),
+                "strength": 1.0,
+            }
         if node.bl_idname == "ShaderNodeMixShader":
             return self._mix(node, source.stack)
         if node.bl_idname == "ShaderNodeAddShader":
@@ -151,7 +166,10 @@ class ClosureTranslator:
         if kind == "black":
             return BLACK
         colors = [entry for entry in node.inputs if entry.type == "RGBA"]
-        return {"type": kind, "color": self.ev.textures.json(self.ev.value(colors[0], stack), "color")}
+        return {
+            "type": kind,
+            "color": self.ev.textures.json(self.ev.value(colors[0], stack), "color"),
+        }
 
     def _shader(self, node: bpy.types.Node, shader: Shader, stack: Stack) -> Closure:
         result: Closure = {"type": shader.closure, **shader.extra}
@@ -201,10 +219,14 @@ class ClosureTranslator:
         if kind == "ShaderNodeSubsurfaceScattering" or (
             weight is not None and self.ev.value(weight, stack) != Constant.number(0.0)
         ):
-            self.ev.warn(node, "subsurface scattering", "diffuse reflection of the same colour is used")
+            self.ev.warn(
+                node, "subsurface scattering", "diffuse reflection of the same colour is used"
+            )
         if kind == "ShaderNodeBsdfMetallic" and node.fresnel_type != "F82":
             self.ev.warn(node, "a measured conductor", "Base Color and Edge Tint are used")
-        if getattr(node, "distribution", "") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"}:
+        if getattr(node, "distribution", "") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"} and (
+            self.ev.value(socket(node, "Roughness"), stack) != Constant.number(0.0)
+        ):
             self.ev.warn(node, f"the {node.distribution.title()} distribution", "GGX is used")
 
     def _normal(self, entry: bpy.types.NodeSocket | None, stack: Stack) -> dict[str, Any] | None:
@@ -233,7 +255,9 @@ class ClosureTranslator:
             return None
         return {
             "texture": self.ev.textures.texture(value, scale=2.0, bias=-1.0),
-            "strength": self.ev.textures.json(self.ev.value(node.inputs["Strength"], stack), "float"),
+            "strength": self.ev.textures.json(
+                self.ev.value(node.inputs["Strength"], stack), "float"
+            ),
             "space": space,
             "uv": node.uv_map if space == "tangent" else "",
         }

@@ -56,7 +56,9 @@ def _shift(offset: np.ndarray) -> np.ndarray:
 
 def _mapping(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> np.ndarray:
     """Matrix of a Mapping node."""
-    rotation = _linear(np.array(Euler(_constant(node.inputs["Rotation"], stack, evaluate), "XYZ").to_matrix()))
+    rotation = _linear(
+        np.array(Euler(_constant(node.inputs["Rotation"], stack, evaluate), "XYZ").to_matrix())
+    )
     scale = _constant(node.inputs["Scale"], stack, evaluate)
     kind = node.vector_type
     if kind in {"VECTOR", "NORMAL"}:
@@ -70,13 +72,17 @@ def _mapping(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> np.ndarr
     return _linear(np.diag(inverse)) @ np.linalg.inv(location @ rotation)
 
 
-def _vector_math(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> tuple[np.ndarray, bpy.types.NodeSocket]:
+def _vector_math(
+    node: bpy.types.Node, stack: Stack, evaluate: Evaluate
+) -> tuple[np.ndarray, bpy.types.NodeSocket]:
     """Matrix of a Vector Math node that is linear in one input, and that input."""
     first, second = node.inputs[0], node.inputs[1]
     operation = node.operation
     if operation == "SCALE":
         return _linear(np.diag(_constant(socket(node, "Scale"), stack, evaluate))), first
-    if operation in {"ADD", "MULTIPLY"} and isinstance(evaluate_quietly(first, stack, evaluate), Constant):
+    if operation in {"ADD", "MULTIPLY"} and isinstance(
+        evaluate_quietly(first, stack, evaluate), Constant
+    ):
         first, second = second, first
     if operation in {"ADD", "SUBTRACT"}:
         offset = _constant(second, stack, evaluate)
@@ -90,11 +96,13 @@ def _vector_math(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> tupl
 
 
 def evaluate_quietly(entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate) -> Value | None:
-    """The value of a socket if it is unlinked, None otherwise: only asks what is surely constant."""
+    """The value of a socket if it is unlinked, None otherwise."""
     return None if resolve(entry, stack).node is not None else evaluate(entry, stack)
 
 
-def coordinates(entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate, *, world: bool) -> Coordinates:
+def coordinates(
+    entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate, *, world: bool
+) -> Coordinates:
     """The coordinates that arrive at a texture's Vector input."""
     matrix = np.eye(4)
     while True:
@@ -119,7 +127,9 @@ def _origin(source: Source, world: bool) -> tuple[str, str]:
     node, name = source.node, source.output.identifier
     kind = node.bl_idname
     if world:
-        if kind == "ShaderNodeTexCoord" and (name == "Generated" or (name == "Object" and node.object is None)):
+        if kind == "ShaderNodeTexCoord" and (
+            name == "Generated" or (name == "Object" and node.object is None)
+        ):
             return "environment", ""
     elif kind == "ShaderNodeUVMap" and not node.from_instancer:
         return "uv", node.uv_map

@@ -8,13 +8,11 @@ import bpy
 import numpy as np
 
 from ..log import ExportLog
-from . import operators
-from .coordinates import coordinates
 from .textures import TextureStore
-from .tree import Stack, is_linked, resolve, socket
+from .tree import Stack, resolve, socket
+from .value_nodes import VALUE_NODES
 from .values import (
     KINDS,
-    AttributeValue,
     Constant,
     ImageValue,
     Kind,
@@ -47,15 +45,13 @@ _STAND_INS: dict[tuple[str, str], tuple[float, ...]] = {
     ("ShaderNodeObjectInfo", "Color"): (1.0, 1.0, 1.0),
 }
 
-_WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "black", "MIRROR": "mirror"}
-
-_RAMP_SIZE = 1024
-
 
 class Evaluator:
     """Evaluates one node tree. `owner` names its material, world or light in warnings."""
 
-    def __init__(self, owner: str, textures: TextureStore, log: ExportLog, *, world: bool = False) -> None:
+    def __init__(
+        self, owner: str, textures: TextureStore, log: ExportLog, *, world: bool = False
+    ) -> None:
         self.owner = owner
         self.textures = textures
         self.log = log
@@ -64,7 +60,10 @@ class Evaluator:
 
     def warn(self, node: bpy.types.Node, what: str, instead: str) -> None:
         """Say that `what` of a node is not supported and what is used `instead`."""
-        self.log.warn(f"{self.owner}: node '{node.name}' ({node.bl_label}): {what} is not supported, {instead}")
+        label = "" if node.bl_label in node.name else f" ({node.bl_label})"
+        self.log.warn(
+            f"{self.owner}: node '{node.name}'{label}: {what} is not supported, {instead}"
+        )
 
     def value(self, entry: bpy.types.NodeSocket, stack: Stack) -> Value:
         """The value at an input, of the input's kind."""
@@ -80,7 +79,9 @@ class Evaluator:
                 value = convert(value, KINDS[kind])
         return value
 
-    def combine(self, node: bpy.types.Node, kind: Kind, function: Callable[..., np.ndarray], *values: Value) -> Value:
+    def combine(
+        self, node: bpy.types.Node, kind: Kind, function: Callable[..., np.ndarray], *values: Value
+    ) -> Value:
         """Apply `function` to values, or to their averages where they cannot be combined."""
         try:
             return combine(node.name, kind, function, *values)
@@ -107,7 +108,11 @@ class Evaluator:
             return Constant.number(0.0)
         if kind == "float":
             return Constant.number(entry.default_value)
-        return Constant.color(entry.default_value) if kind == "color" else Constant.vector(entry.default_value)
+        return (
+            Constant.color(entry.default_value)
+            if kind == "color"
+            else Constant.vector(entry.default_value)
+        )
 
     def _output(self, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
         key = (node.as_pointer(), output.identifier, tuple(group.as_pointer() for group in stack))
@@ -123,11 +128,15 @@ class Evaluator:
             return handler(self, node, output, stack)
         except UnsupportedError as reason:
             stand_in = self._stand_in(node, output, stack)
-            rounded = ", ".join(f"{number:.3g}" for number in stand_in.rgb[: 1 if stand_in.kind == "float" else 3])
+            rounded = ", ".join(
+                f"{number:.3g}" for number in stand_in.rgb[: 1 if stand_in.kind == "float" else 3]
+            )
             self.warn(node, str(reason), f"{rounded} is used")
             return stand_in
 
-    def _stand_in(self, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Constant:
+    def _stand_in(
+        self, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+    ) -> Constant:
         """The plainest value that could come from a node: a mean of what it mixes."""
         kind = KINDS.get(output.type, "float")
         known = _STAND_INS.get((node.bl_idname, output.identifier))
@@ -136,7 +145,10 @@ class Evaluator:
         if node.bl_idname == "ShaderNodeFresnel":
             ior = self.number(node.inputs["IOR"], stack)
             return Constant.number(((ior - 1.0) / (ior + 1.0)) ** 2 if ior > 0 else 0.0)
-        if node.bl_idname in {"ShaderNodeTexImage", "ShaderNodeTexEnvironment"} and node.image is not None:
+        if (
+            node.bl_idname in {"ShaderNodeTexImage", "ShaderNodeTexEnvironment"}
+            and node.image is not None
+        ):
             source = self.textures.source(node.image, straight_alpha=output.identifier == "Alpha")
             channel = "a" if output.identifier == "Alpha" else "rgb"
             return average(ImageValue(source, Sampling("uv", (1, 0, 0, 0, 1, 0)), kind, channel))
@@ -151,220 +163,3 @@ class Evaluator:
     def inputs(self, node: bpy.types.Node, stack: Stack, *identifiers: str) -> list[Value]:
         """Values of several inputs."""
         return [self.value(socket(node, identifier), stack) for identifier in identifiers]
-
-
-Handler = Callable[[Evaluator, bpy.types.Node, bpy.types.NodeSocket, Stack], Value]
-
-
-def _rgb(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    return Constant.color(output.default_value)
-
-
-def _number(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    return Constant.number(output.default_value)
-
-
-def _image(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Image Texture and Environment Texture."""
-    environment = node.bl_idname == "ShaderNodeTexEnvironment"
-    alpha = output.identifier == "Alpha"
-    if node.image is None:
-        ev.warn(node, "a node without an image", "magenta is used")
-        return Constant.number(1.0) if alpha else Constant.color((1.0, 0.0, 1.0))
-    if node.projection not in {"FLAT", "EQUIRECTANGULAR"}:
-        raise UnsupportedError(f"the {node.projection.lower().replace('_', ' ')} projection")
-    place = coordinates(node.inputs["Vector"], stack, ev.value, world=ev.world)
-    if environment != (place.space == "environment"):
-        raise UnsupportedError("a texture of this kind in this place")
-    if node.interpolation in {"Cubic", "Smart"}:
-        ev.warn(node, f"{node.interpolation.lower()} interpolation", "linear is used")
-    texture_filter = "closest" if node.interpolation == "Closest" else "linear"
-    if environment:
-        sampling = Sampling("environment", place.direction_matrix(), filter=texture_filter)
-        straight = False
-    else:
-        sampling = Sampling("uv", place.uv_transform(), place.uv, _WRAP[node.extension], texture_filter)
-        straight = is_linked(node.outputs["Alpha"])
-    source = ev.textures.source(node.image, straight_alpha=straight)
-    return ImageValue(source, sampling, "float" if alpha else "color", "a" if alpha else "rgb")
-
-
-def _attribute(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Attribute and Color Attribute."""
-    if node.bl_idname == "ShaderNodeVertexColor":
-        name = node.layer_name
-        if not name:
-            raise UnsupportedError("an unnamed colour attribute")
-    else:
-        name = node.attribute_name
-        if node.attribute_type != "GEOMETRY" or not name:
-            raise UnsupportedError(f"an attribute of type {node.attribute_type.lower()}")
-    channel = {"Alpha": "a", "Fac": "average"}.get(output.identifier, "rgb")
-    return AttributeValue(name, KINDS[output.type], channel)
-
-
-def _math(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    function = operators.MATH[node.operation]
-    if node.use_clamp:
-        result = ev.combine(node, "float", lambda a, b, c: np.clip(function(a, b, c), 0, 1), *_all(ev, node, stack))
-    else:
-        result = ev.combine(node, "float", function, *_all(ev, node, stack))
-    return result
-
-
-def _all(ev: Evaluator, node: bpy.types.Node, stack: Stack) -> list[Value]:
-    return [ev.value(entry, stack) for entry in node.inputs]
-
-
-def _vector_math(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    operation = node.operation
-    values = _all(ev, node, stack)
-    if operation in operators.VECTOR_BY_COMPONENT:
-        return ev.combine(node, "vector", operators.MATH[operators.VECTOR_BY_COMPONENT[operation]], *values[:3])
-    if operation in operators.VECTOR_TO_FLOAT:
-        return ev.combine(node, "float", operators.VECTOR_TO_FLOAT[operation], *values)
-    if operation in operators.VECTOR:
-        return ev.combine(node, "vector", operators.VECTOR[operation], *values)
-    raise UnsupportedError(f"the vector operation {operation.lower()}")
-
-
-def _mix(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Mix and the older MixRGB."""
-    if node.bl_idname == "ShaderNodeMixRGB":
-        names, kind, blend = ("Fac", "Color1", "Color2"), "color", node.blend_type
-        clamp_factor, clamp_result = True, node.use_clamp
-    else:
-        suffix = {"FLOAT": "Float", "VECTOR": "Vector", "RGBA": "Color"}.get(node.data_type)
-        if suffix is None:
-            raise UnsupportedError("mixing rotations")
-        factor = "Factor_Vector" if suffix == "Vector" and node.factor_mode == "NON_UNIFORM" else "Factor_Float"
-        names = (factor, f"A_{suffix}", f"B_{suffix}")
-        kind = {"Float": "float", "Vector": "vector", "Color": "color"}[suffix]
-        blend = node.blend_type if suffix == "Color" else "MIX"
-        clamp_factor, clamp_result = node.clamp_factor, node.clamp_result and suffix == "Color"
-    function = operators.MIX[blend]
-
-    def apply(t: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        result = function(np.clip(t, 0, 1) if clamp_factor else t, a, b)
-        return np.clip(result, 0, 1) if clamp_result else result
-
-    return ev.combine(node, kind, apply, *ev.inputs(node, stack, *names))
-
-
-def _invert(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    return ev.combine(node, "color", lambda t, c: c + (1 - 2 * c) * t, *ev.inputs(node, stack, "Fac", "Color"))
-
-
-def _simple(function: Callable[..., np.ndarray], kind: Kind, *identifiers: str) -> Handler:
-    """A node that is one function of its inputs."""
-
-    def handler(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-        return ev.combine(node, kind, function, *ev.inputs(node, stack, *identifiers))
-
-    return handler
-
-
-def _map_range(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    names = ["Value", "From Min", "From Max", "To Min", "To Max", "Steps"]
-    kind: Kind = "float"
-    if node.data_type == "FLOAT_VECTOR":
-        names = ["Vector", "From_Min_FLOAT3", "From_Max_FLOAT3", "To_Min_FLOAT3", "To_Max_FLOAT3", "Steps_FLOAT3"]
-        kind = "vector"
-    function = operators.map_range(node.interpolation_type, node.clamp)
-    return ev.combine(node, kind, function, *ev.inputs(node, stack, *names))
-
-
-def _clamp(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    def apply(value: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        if node.clamp_type == "RANGE":
-            low, high = np.minimum(low, high), np.maximum(low, high)
-        return np.minimum(np.maximum(value, low), high)
-
-    return ev.combine(node, "float", apply, *ev.inputs(node, stack, "Value", "Min", "Max"))
-
-
-def _ramp(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Color Ramp, by a table."""
-    positions = np.linspace(0.0, 1.0, _RAMP_SIZE)
-    table = np.array([node.color_ramp.evaluate(position)[:] for position in positions], np.float32)
-    table = table[:, 3:] if output.identifier == "Alpha" else table[:, :3]
-    if node.color_ramp.interpolation == "CONSTANT":
-        # A step must stay one, so the nearest entry is taken below.
-        def apply(t: np.ndarray) -> np.ndarray:
-            return table[np.clip(t[..., 0] * (_RAMP_SIZE - 1), 0, _RAMP_SIZE - 1).astype(int)]
-    else:
-
-        def apply(t: np.ndarray) -> np.ndarray:
-            return np.stack([np.interp(t[..., 0], positions, column) for column in table.T], axis=-1)
-
-    return ev.combine(node, KINDS[output.type], apply, ev.value(node.inputs["Fac"], stack))
-
-
-def _separate(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Separate Color and Separate XYZ."""
-    index = {"Red": 0, "Green": 1, "Blue": 2, "X": 0, "Y": 1, "Z": 2}[output.identifier]
-    value = ev.value(node.inputs[0], stack)
-    mode = getattr(node, "mode", "RGB")
-    if mode == "HSV":
-        return ev.combine(node, "float", lambda c: operators.rgb_to_hsv(c)[..., [index]], value)
-    if mode != "RGB":
-        raise UnsupportedError(f"the {mode} model")
-    if not isinstance(value, Constant) and value.channel == "rgb":
-        # A channel of an image costs nothing.
-        kind: Kind = "float"
-        if isinstance(value, ImageValue):
-            return ImageValue(value.source, value.sampling, kind, "rgb"[index])
-        return AttributeValue(value.name, kind, "rgb"[index])
-    return ev.combine(node, "float", lambda c: c[..., [index]], value)
-
-
-def _combine(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Combine Color and Combine XYZ."""
-    mode = getattr(node, "mode", "RGB")
-    if mode not in {"RGB", "HSV"}:
-        raise UnsupportedError(f"the {mode} model")
-
-    def apply(*channels: np.ndarray) -> np.ndarray:
-        result = np.concatenate(np.broadcast_arrays(*channels), axis=-1)
-        return operators.hsv_to_rgb(result) if mode == "HSV" else result
-
-    return ev.combine(node, KINDS[output.type], apply, *_all(ev, node, stack))
-
-
-def _blackbody(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    return Constant.color(operators.blackbody(ev.number(node.inputs["Temperature"], stack)))
-
-
-def _falloff(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Light Falloff: only the physical, quadratic one without smoothing is."""
-    if output.identifier != "Quadratic" or ev.number(node.inputs["Smooth"], stack) != 0.0:
-        ev.warn(node, "a falloff that is not quadratic", "the strength is used as it is")
-    return ev.value(node.inputs["Strength"], stack)
-
-
-VALUE_NODES: dict[str, Handler] = {
-    "ShaderNodeRGB": _rgb,
-    "ShaderNodeValue": _number,
-    "ShaderNodeTexImage": _image,
-    "ShaderNodeTexEnvironment": _image,
-    "ShaderNodeVertexColor": _attribute,
-    "ShaderNodeAttribute": _attribute,
-    "ShaderNodeMath": _math,
-    "ShaderNodeVectorMath": _vector_math,
-    "ShaderNodeMix": _mix,
-    "ShaderNodeMixRGB": _mix,
-    "ShaderNodeInvert": _invert,
-    "ShaderNodeGamma": _simple(operators.gamma, "color", "Color", "Gamma"),
-    "ShaderNodeBrightContrast": _simple(operators.bright_contrast, "color", "Color", "Bright", "Contrast"),
-    "ShaderNodeHueSaturation": _simple(operators.hue_saturation, "color", "Color", "Hue", "Saturation", "Value", "Fac"),
-    "ShaderNodeRGBToBW": lambda ev, node, output, stack: convert(ev.value(node.inputs["Color"], stack), "float"),
-    "ShaderNodeMapRange": _map_range,
-    "ShaderNodeClamp": _clamp,
-    "ShaderNodeValToRGB": _ramp,
-    "ShaderNodeSeparateColor": _separate,
-    "ShaderNodeSeparateXYZ": _separate,
-    "ShaderNodeCombineColor": _combine,
-    "ShaderNodeCombineXYZ": _combine,
-    "ShaderNodeBlackbody": _blackbody,
-    "ShaderNodeLightFalloff": _falloff,
-}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -11,7 +12,7 @@ from .closures import BLACK, ClosureTranslator
 from .evaluate import Evaluator
 from .textures import TextureStore
 from .tree import Stack, is_linked, resolve, socket
-from .values import Constant, Value, average
+from .values import Constant, ImageValue, Value, average
 
 _DEFAULT_SURFACE = {"type": "diffuse", "color": [0.8, 0.8, 0.8]}
 
@@ -82,7 +83,9 @@ class Translator:
         evaluator = Evaluator(f"Light '{light.name}'", self.textures, self._log)
         value = _radiance(evaluator, socket(output, "Surface"), ())
         if not isinstance(value, Constant):
-            self._log.warn(f"Light '{light.name}': a textured light is not supported, its average is used")
+            self._log.warn(
+                f"Light '{light.name}': a textured light is not supported, its average is used"
+            )
         return average(value).rgb
 
 
@@ -95,8 +98,8 @@ def _radiance(ev: Evaluator, entry: bpy.types.NodeSocket, stack: Stack) -> Value
     stack = source.stack
     if node.bl_idname in {"ShaderNodeBackground", "ShaderNodeEmission"}:
         color, strength = ev.inputs(node, stack, "Color", "Strength")
-        if strength == Constant.number(1.0):
-            return color
+        if isinstance(color, ImageValue) and isinstance(strength, Constant):
+            return replace(color, gain=color.gain * strength.rgb[0])
         return ev.combine(node, "color", lambda c, s: c * s, color, strength)
     if node.bl_idname == "ShaderNodeAddShader":
         parts = [_radiance(ev, part, stack) for part in node.inputs]

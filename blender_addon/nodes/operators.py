@@ -38,7 +38,9 @@ def _ping_pong(value: Array, scale: Array) -> Array:
 
 def _smooth_min(a: Array, b: Array, distance: Array) -> Array:
     """Polynomial smooth minimum of width `distance`."""
-    h = np.maximum(distance - np.abs(a - b), 0) * np.where(distance != 0, 1 / np.where(distance != 0, distance, 1), 0)
+    h = np.maximum(distance - np.abs(a - b), 0) * np.where(
+        distance != 0, 1 / np.where(distance != 0, distance, 1), 0
+    )
     return np.minimum(a, b) - h**3 * distance / 6
 
 
@@ -122,7 +124,9 @@ def _dot(a: Array, b: Array) -> Array:
 VECTOR: dict[str, Callable[[Array, Array, Array, Array], Array]] = {
     "CROSS_PRODUCT": lambda a, b, c, s: np.cross(a, b),
     "PROJECT": lambda a, b, c, s: b * _safe_divide(_dot(a, b), _dot(b, b)),
-    "REFLECT": lambda a, b, c, s: a - 2 * _dot(a, _safe_divide(b, _length(b))) * _safe_divide(b, _length(b)),
+    "REFLECT": lambda a, b, c, s: (
+        a - 2 * _dot(a, _safe_divide(b, _length(b))) * _safe_divide(b, _length(b))
+    ),
     "SCALE": lambda a, b, c, s: a * s,
     "NORMALIZE": lambda a, b, c, s: _safe_divide(a, _length(a)),
 }
@@ -138,7 +142,10 @@ def rgb_to_hsv(rgb: Array) -> Array:
     high = rgb.max(axis=-1)
     span = high - rgb.min(axis=-1)
     r, g, b = (_safe_divide(high - rgb[..., i], span) for i in range(3))
-    hue = np.where(rgb[..., 0] == high, b - g, np.where(rgb[..., 1] == high, 2 + r - b, 4 + g - r)) / 6
+    hue = (
+        np.where(rgb[..., 0] == high, b - g, np.where(rgb[..., 1] == high, 2 + r - b, 4 + g - r))
+        / 6
+    )
     hue = np.where(span == 0, 0, hue - np.floor(hue))
     return np.stack([hue, _safe_divide(span, high), high], axis=-1)
 
@@ -146,17 +153,25 @@ def rgb_to_hsv(rgb: Array) -> Array:
 def hsv_to_rgb(hsv: Array) -> Array:
     """Inverse of `rgb_to_hsv`."""
     h, s, v = hsv[..., 0] * 6, hsv[..., 1], hsv[..., 2]
-    channels = [np.clip(np.abs(h - 3) - 1, 0, 1), np.clip(2 - np.abs(h - 2), 0, 1), np.clip(2 - np.abs(h - 4), 0, 1)]
+    channels = [
+        np.clip(np.abs(h - 3) - 1, 0, 1),
+        np.clip(2 - np.abs(h - 2), 0, 1),
+        np.clip(2 - np.abs(h - 4), 0, 1),
+    ]
     return np.stack([((channel - 1) * s + 1) * v for channel in channels], axis=-1)
 
 
-def hue_saturation(color: Array, hue: Array, saturation: Array, value: Array, factor: Array) -> Array:
+def hue_saturation(
+    color: Array, hue: Array, saturation: Array, value: Array, factor: Array
+) -> Array:
     """The Hue/Saturation/Value node; a hue of 0.5 changes nothing."""
     hsv = rgb_to_hsv(color)
     shifted = hsv[..., :1] + hue + 0.5
     changed = np.concatenate(
         np.broadcast_arrays(
-            shifted - np.floor(shifted), np.clip(hsv[..., 1:2] * saturation, 0, 1), hsv[..., 2:] * value
+            shifted - np.floor(shifted),
+            np.clip(hsv[..., 1:2] * saturation, 0, 1),
+            hsv[..., 2:] * value,
         ),
         axis=-1,
     )
@@ -226,7 +241,9 @@ def _smoother_step(t: Array) -> Array:
 def map_range(kind: str, clamp: bool) -> Callable[..., Array]:
     """The Map Range node: value, the range it comes from, the one it goes to, and the steps."""
 
-    def apply(value: Array, low: Array, high: Array, to_low: Array, to_high: Array, steps: Array) -> Array:
+    def apply(
+        value: Array, low: Array, high: Array, to_low: Array, to_high: Array, steps: Array
+    ) -> Array:
         t = _safe_divide(value - low, high - low)
         if kind == "STEPPED":
             t = np.where(steps > 0, _safe_divide(np.floor(t * (steps + 1)), steps), 0)
@@ -264,7 +281,11 @@ def blackbody(temperature: float) -> tuple[float, float, float]:
         width = np.where(wavelengths < centre, left, right)
         return height * np.exp(-0.5 * ((wavelengths - centre) * width) ** 2)
 
-    x = lobe(0.362, 442.0, 0.0624, 0.0374) + lobe(1.056, 599.8, 0.0264, 0.0323) + lobe(-0.065, 501.1, 0.0490, 0.0382)
+    x = (
+        lobe(0.362, 442.0, 0.0624, 0.0374)
+        + lobe(1.056, 599.8, 0.0264, 0.0323)
+        + lobe(-0.065, 501.1, 0.0490, 0.0382)
+    )
     y = lobe(0.821, 568.8, 0.0213, 0.0247) + lobe(0.286, 530.9, 0.0613, 0.0322)
     z = lobe(1.217, 437.0, 0.0845, 0.0278) + lobe(0.681, 459.0, 0.0385, 0.0725)
     # Second radiation constant in nm K; the first one cancels.
@@ -272,7 +293,11 @@ def blackbody(temperature: float) -> tuple[float, float, float]:
     spectrum = wavelengths**-5.0 / np.expm1(exponent)
     xyz = np.array([(spectrum * curve).sum() for curve in (x, y, z)])
     to_rgb = np.array(
-        [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+        [
+            [3.2404542, -1.5371385, -0.4985314],
+            [-0.9692660, 1.8760108, 0.0415560],
+            [0.0556434, -0.2040259, 1.0572252],
+        ]
     )
     r, g, b = to_rgb @ (xyz / xyz[1])
     return float(r), float(g), float(b)

@@ -63,19 +63,26 @@ class TextureStore:
                 pixels = source.pixels()
                 values, colorspace = pixels.values, pixels.colorspace
             else:
-                values, colorspace = source.texels(), "linear"
+                values, colorspace = source.texels()[..., :3], "linear"
             identifier = self._scene.add_image(source.name, values, colorspace)
             self._images[id(source)] = (source, identifier)
         return self._images[id(source)][1]
 
-    def texture(self, value: ImageValue | AttributeValue, scale: float = 1.0, bias: float = 0.0) -> int:
+    def texture(
+        self, value: ImageValue | AttributeValue, scale: float = 1.0, bias: float = 0.0
+    ) -> int:
         """Id of the texture that yields `scale * value + bias`."""
         if isinstance(value, AttributeValue):
             self.attributes.add(value.name)
             name = value.name
-            data: dict[str, Any] = {"type": "attribute", "name": value.name, "default": [0.0, 0.0, 0.0, 1.0]}
+            data: dict[str, Any] = {
+                "type": "attribute",
+                "name": value.name,
+                "default": [0.0, 0.0, 0.0, 1.0],
+            }
         else:
             sampling = value.sampling
+            scale *= value.gain
             if sampling.uv:
                 self.attributes.add(sampling.uv)
             name = value.source.name

@@ -26,7 +26,9 @@ class Source:
     kinds: tuple[str, ...] = ()
 
 
-def _same(sockets: bpy.types.NodeInputs | bpy.types.NodeOutputs, identifier: str) -> bpy.types.NodeSocket | None:
+def _same(
+    sockets: bpy.types.NodeInputs | bpy.types.NodeOutputs, identifier: str
+) -> bpy.types.NodeSocket | None:
     return next((socket for socket in sockets if socket.identifier == identifier), None)
 
 
@@ -42,7 +44,9 @@ def is_linked(entry: bpy.types.NodeSocket | None) -> bool:
 
 def _group_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     outputs = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
-    return next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
+    return next(
+        (node for node in outputs if node.is_active_output), outputs[0] if outputs else None
+    )
 
 
 def resolve(entry: bpy.types.NodeSocket, stack: Stack) -> Source:
@@ -57,7 +61,9 @@ def resolve(entry: bpy.types.NodeSocket, stack: Stack) -> Source:
         if node.bl_idname == "NodeReroute":
             inner = node.inputs[0]
         elif node.mute:
-            inner = next((link.from_socket for link in node.internal_links if link.to_socket == output), None)
+            inner = next(
+                (link.from_socket for link in node.internal_links if link.to_socket == output), None
+            )
         elif node.bl_idname == "ShaderNodeGroup":
             end = _group_output(node.node_tree) if node.node_tree else None
             inner = _same(end.inputs, output.identifier) if end else None

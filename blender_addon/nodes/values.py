@@ -81,12 +81,13 @@ class Sampling:
 
 @dataclass(frozen=True, eq=False)
 class ImageValue:
-    """An image; `channel` is one of the ABI's, and "rgb" for colours and vectors."""
+    """An image times `gain`; `channel` is one of the ABI's, and "rgb" for colours and vectors."""
 
     source: ImageSource
     sampling: Sampling
     kind: Kind = "color"
     channel: str = "rgb"
+    gain: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,10 @@ Value = Constant | ImageValue | AttributeValue
 
 @dataclass(eq=False)
 class Baked:
-    """An image that was computed from others. `values`: (height, width, 1 or 3), linear."""
+    """An image that was computed from others. `values`: (height, width, 1 or 3), linear.
+
+    It has no alpha channel of its own: values that came from one are ordinary numbers here.
+    """
 
     name: str
     values: np.ndarray = field(repr=False)
@@ -125,7 +129,9 @@ def convert(value: Value, kind: Kind) -> Value:
             return replace(value, kind=kind)
         return Constant.number(_grey(np.array(value.rgb), value.kind)[0])
     if kind == "float" and value.channel == "rgb":
-        return replace(value, kind=kind, channel="luminance" if value.kind == "color" else "average")
+        return replace(
+            value, kind=kind, channel="luminance" if value.kind == "color" else "average"
+        )
     return replace(value, kind=kind)
 
 
@@ -144,6 +150,8 @@ def array(value: Value) -> np.ndarray:
     if isinstance(value, AttributeValue):
         raise UnsupportedError("arithmetic on a mesh attribute")
     texels = value.source.texels()
+    if value.gain != 1.0:
+        texels = texels * np.float32(value.gain)
     if value.channel == "rgb":
         return texels[..., :3]
     if value.channel in "rgba":
@@ -178,9 +186,15 @@ def combine(name: str, kind: Kind, function: Callable[..., np.ndarray], *values:
     if len(sizes) > 1:
         raise UnsupportedError("images of different sizes")
     with np.errstate(all="ignore"):
-        result = np.nan_to_num(np.asarray(function(*arrays), np.float32), nan=0.0, posinf=0.0, neginf=0.0)
+        result = np.nan_to_num(
+            np.asarray(function(*arrays), np.float32), nan=0.0, posinf=0.0, neginf=0.0
+        )
     if not images:
         flat = result.ravel()
-        return Constant.number(flat[0]) if kind == "float" else replace(Constant.color(flat), kind=kind)
+        return (
+            Constant.number(flat[0])
+            if kind == "float"
+            else replace(Constant.color(flat), kind=kind)
+        )
     channel = "r" if kind == "float" else "rgb"
     return ImageValue(Baked(name, result), images[0].sampling, kind, channel)

@@ -34,7 +34,11 @@ def mesh(name: str, points: Sequence, faces: Sequence) -> bpy.types.Mesh:
 
 def quad(name: str = "Quad", size: float = 1.0) -> bpy.types.Mesh:
     """A square of half width `size` in the XY plane with a UV map over all of it."""
-    data = mesh(name, [(-size, -size, 0), (size, -size, 0), (size, size, 0), (-size, size, 0)], [(0, 1, 2, 3)])
+    data = mesh(
+        name,
+        [(-size, -size, 0), (size, -size, 0), (size, size, 0), (-size, size, 0)],
+        [(0, 1, 2, 3)],
+    )
     layer = data.uv_layers.new(name="UVMap")
     layer.uv.foreach_set("vector", np.array([0, 0, 1, 0, 1, 1, 0, 1], np.float32))
     return data
@@ -47,13 +51,17 @@ def cube(name: str = "Cube", half: float = 1.0) -> bpy.types.Mesh:
     return mesh(name, points, faces)
 
 
-def sphere(name: str = "Sphere", radius: float = 1.0, segments: int = 32, rings: int = 16) -> bpy.types.Mesh:
+def sphere(
+    name: str = "Sphere", radius: float = 1.0, segments: int = 32, rings: int = 16
+) -> bpy.types.Mesh:
     """A smooth UV sphere with a UV map."""
     import bmesh
 
     work = bmesh.new()
     work.loops.layers.uv.verify()
-    bmesh.ops.create_uvsphere(work, u_segments=segments, v_segments=rings, radius=radius, calc_uvs=True)
+    bmesh.ops.create_uvsphere(
+        work, u_segments=segments, v_segments=rings, radius=radius, calc_uvs=True
+    )
     data = bpy.data.meshes.new(name)
     work.to_mesh(data)
     work.free()
@@ -79,7 +87,9 @@ def light(kind: str, matrix: Any = None, name: str = "", **properties: Any) -> b
     return link(data, name or kind.title(), matrix)
 
 
-def material(name: str = "Material") -> tuple[bpy.types.Material, bpy.types.NodeTree, bpy.types.Node]:
+def material(
+    name: str = "Material",
+) -> tuple[bpy.types.Material, bpy.types.NodeTree, bpy.types.Node]:
     """A material with an empty node tree and its output node."""
     data = bpy.data.materials.new(name)
     if bpy.app.version < (5, 0, 0):
@@ -90,7 +100,7 @@ def material(name: str = "Material") -> tuple[bpy.types.Material, bpy.types.Node
 
 
 def shader_material(kind: str, name: str = "Material", **inputs: Any) -> bpy.types.Material:
-    """A material of one shader node, whose inputs are given by identifier (spaces as underscores)."""
+    """A material of one shader node; inputs by identifier, with underscores for spaces."""
     data, tree, output = material(name)
     node = tree.nodes.new(f"ShaderNode{kind}")
     for key, value in inputs.items():
@@ -122,7 +132,9 @@ def settings(width: int = 64, height: int = 48, engine: str = "SEGUE") -> bpy.ty
     return scene
 
 
-def image(name: str, pixels: np.ndarray, colorspace: str = "sRGB", *, is_float: bool = False) -> bpy.types.Image:
+def image(
+    name: str, pixels: np.ndarray, colorspace: str = "sRGB", *, is_float: bool = False
+) -> bpy.types.Image:
     """An image of the file from (height, width, 4) values, row 0 on top."""
     height, width = pixels.shape[:2]
     data = bpy.data.images.new(name, width, height, alpha=True, float_buffer=is_float)
@@ -201,7 +213,9 @@ def exr_channels(path: Path) -> set[str]:
                     at += 16
             position += size
         position += 1
-        names |= {name if name.startswith(part + ".") or not part else f"{part}.{name}" for name in found}
+        names |= {
+            name if name.startswith(part + ".") or not part else f"{part}.{name}" for name in found
+        }
         if not multipart:
             return names
 

@@ -1,17 +1,17 @@
 """Runs cases inside Blender's Python module, each in a process of its own.
 
-`SEGUE_BPY_PYTHON` names a Python with `bpy`; by default it is the one that runs the tests. A case is
-a function `case_*` of a module in `cases/`; `harness.py` runs it. A process of its own keeps a
+`SEGUE_BPY_PYTHON` names a Python with `bpy`; by default it is the one that runs the tests. A case
+is a function `case_*` of a module in `cases/`; `harness.py` runs it. A process of its own keeps a
 crash of one case from hiding the others, and Blender's module cannot be restarted within one.
 """
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -20,12 +20,7 @@ HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 TIMEOUT = 900
 
-
-def cases(module: str) -> list[str]:
-    """Names of the cases of a module, without importing it (it imports `bpy`)."""
-    tree = ast.parse((HERE / "cases" / f"{module}.py").read_text())
-    functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
-    return [name for name in functions if name.startswith("case_")]
+RunCase = Callable[[str, str, str], None]
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +35,7 @@ def blender_python() -> str:
 
 
 @pytest.fixture
-def run_case(blender_python, tmp_path):
+def run_case(blender_python: str, tmp_path: Path) -> RunCase:
     """Run one case; its failure is the test's, with all that Blender printed."""
 
     def run(module: str, name: str, engine: str) -> None:
@@ -66,7 +61,9 @@ def run_case(blender_python, tmp_path):
         output = process.stdout
         if process.returncode == 77:
             pytest.skip(output.strip().splitlines()[-1])
-        assert process.returncode == 0, f"{module}.{name} ended with {process.returncode}:\n{output}"
+        assert process.returncode == 0, (
+            f"{module}.{name} ended with {process.returncode}:\n{output}"
+        )
 
     return run
 

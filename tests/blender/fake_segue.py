@@ -42,7 +42,9 @@ class Scene:
         SCENES.append(self)
 
     def add_mesh(self, name: str, points: np.ndarray, face_indices: np.ndarray, **rest: Any) -> int:
-        self.meshes.append({"name": name, "points": points.copy(), "face_indices": face_indices.copy(), **rest})
+        self.meshes.append(
+            {"name": name, "points": points.copy(), "face_indices": face_indices.copy(), **rest}
+        )
         return len(self.meshes) - 1
 
     def add_image(self, name: str, pixels: np.ndarray, colorspace: str = "srgb") -> int:
@@ -65,7 +67,9 @@ class Scene:
         self.camera = (name, data)
 
     def add_instances(self, name: str, mesh: int, transforms: np.ndarray, **rest: Any) -> None:
-        self.instances.append({"name": name, "mesh": mesh, "transforms": np.array(transforms), **rest})
+        self.instances.append(
+            {"name": name, "mesh": mesh, "transforms": np.array(transforms), **rest}
+        )
 
     def info(self) -> dict[str, Any]:
         return {"warnings": [], "counts": {}}

@@ -6,15 +6,20 @@ import itertools
 import math
 
 import bpy
-import builders
 import numpy as np
 from mathutils import Euler, Matrix
 
+import builders
 
-def _window_from_matrix(item: bpy.types.Object, width: int, height: int, aspect: tuple[float, float]) -> list[float]:
+
+def _window_from_matrix(
+    item: bpy.types.Object, width: int, height: int, aspect: tuple[float, float]
+) -> list[float]:
     """The film's edges, read back from Blender's projection matrix."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    projection = np.array(item.calc_matrix_camera(depsgraph, x=width, y=height, scale_x=aspect[0], scale_y=aspect[1]))
+    projection = np.array(
+        item.calc_matrix_camera(depsgraph, x=width, y=height, scale_x=aspect[0], scale_y=aspect[1])
+    )
     # A perspective point on z = -1 lands at P00 x - P02; an orthographic one at P00 x + P03.
     column, sign = (3, -1.0) if item.data.type == "ORTHO" else (2, 1.0)
     x = [(edge + sign * projection[0, column]) / projection[0, 0] for edge in (-1.0, 1.0)]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import bpy
-import builders
-import fake_segue
 import numpy as np
 from mathutils import Matrix
+
+import builders
+import fake_segue
 
 OUTPUT = builders.OUTPUT
 
@@ -32,7 +33,9 @@ def case_the_file_has_the_picture_the_right_way_up() -> None:
     assert picture.shape == (48, 64, 4)
     # The recording package paints the column into red and the row, from the top, into green.
     np.testing.assert_array_equal(picture[..., 0], np.broadcast_to(np.arange(64.0), (48, 64)))
-    np.testing.assert_array_equal(picture[..., 1], np.broadcast_to(np.arange(48.0)[:, None], (48, 64)))
+    np.testing.assert_array_equal(
+        picture[..., 1], np.broadcast_to(np.arange(48.0)[:, None], (48, 64))
+    )
 
 
 def case_resolution_percentage() -> None:
@@ -108,12 +111,13 @@ def case_every_pass_reaches_the_file() -> None:
         "Indirect": "RGB",
     }
     layer = bpy.context.view_layer.name
-    wanted = {f"{layer}.{name}.{channel}" for name, channels in names.items() for channel in channels}
+    wanted = {
+        f"{layer}.{name}.{channel}" for name, channels in names.items() for channel in channels
+    }
     assert wanted <= found, wanted - found
-    assert fake_segue.RENDERS[-1].settings["passes"] == [
-        "Combined", "Depth", "Position", "Normal", "UV", "ObjectIndex", "MaterialIndex", "Emission", "Albedo",
-        "Direct", "Indirect",
-    ]  # fmt: skip
+    asked = "Combined Depth Position Normal UV ObjectIndex MaterialIndex Emission"
+    asked += " Albedo Direct Indirect"
+    assert fake_segue.RENDERS[-1].settings["passes"] == asked.split()
 
 
 def case_view_layers_are_rendered_apart() -> None:
@@ -162,7 +166,9 @@ def case_animation() -> None:
     bpy.ops.render.render(animation=True)
     xs = [render.scene.instances[0]["transforms"][0, 0, 3] for render in fake_segue.RENDERS]
     assert xs[0] == 0.0 and xs[2] == 2.0 and 0.0 < xs[1] < 2.0
-    assert sorted(path.name for path in OUTPUT.glob("frame_*")) == [f"frame_000{i}.exr" for i in (1, 2, 3)]
+    assert sorted(path.name for path in OUTPUT.glob("frame_*")) == [
+        f"frame_000{i}.exr" for i in (1, 2, 3)
+    ]
 
 
 def case_settings_reach_the_engine() -> None:
@@ -212,7 +218,9 @@ def case_tiles_are_shown_while_rendering() -> None:
     picture = _rendered()
     assert shown == [(0, 0, 32, 24), (32, 0, 64, 24), (0, 24, 32, 48), (32, 24, 64, 48)]
     np.testing.assert_array_equal(picture[..., 0], np.broadcast_to(np.arange(64.0), (48, 64)))
-    np.testing.assert_array_equal(picture[..., 1], np.broadcast_to(np.arange(48.0)[:, None], (48, 64)))
+    np.testing.assert_array_equal(
+        picture[..., 1], np.broadcast_to(np.arange(48.0)[:, None], (48, 64))
+    )
 
 
 def case_progress_and_statistics_are_told() -> None:
@@ -245,6 +253,10 @@ def case_panels_of_blender_are_shared() -> None:
     import blender_addon
 
     blender_addon.unregister()
-    left = [panel for panel in bpy.types.Panel.__subclasses__() if "SEGUE" in getattr(panel, "COMPAT_ENGINES", ())]
+    left = [
+        panel
+        for panel in bpy.types.Panel.__subclasses__()
+        if "SEGUE" in getattr(panel, "COMPAT_ENGINES", ())
+    ]
     blender_addon.register()
     assert not left, left

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import bpy
+from mathutils import Matrix
+
 import builders
 import fake_segue
-from mathutils import Matrix
 
 OUTPUT = builders.OUTPUT
 

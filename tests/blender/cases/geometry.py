@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import bpy
-import builders
 import numpy as np
 from mathutils import Euler, Matrix
+
+import builders
 
 
 def _triangles(mesh: dict) -> np.ndarray:
@@ -21,7 +22,9 @@ def case_cube() -> None:
     builders.link(builders.cube())
     scene, warnings = builders.export()
     (mesh,) = scene.meshes
-    assert mesh["face_indices"].size == 36 and mesh["normals"] is None and mesh["face_slots"] is None
+    assert (
+        mesh["face_indices"].size == 36 and mesh["normals"] is None and mesh["face_slots"] is None
+    )
     assert abs(_area(mesh) - 24.0) < 1e-5
     (instances,) = scene.instances
     assert instances["transforms"].shape == (1, 4, 4) and instances["camera_visible"]
@@ -130,14 +133,20 @@ def case_mirrored_and_sheared_matrices() -> None:
     data = builders.cube()
     mirror = Matrix.Diagonal((-1, 2, 1, 1))
     shear = Matrix(((1, 0.5, 0, 1), (0, 1, 0.25, 2), (0, 0, 1, 3), (0, 0, 0, 1)))
-    outer = builders.link(None, "Outer", Euler((0.3, 0.2, 0.1)).to_matrix().to_4x4() @ Matrix.Diagonal((1, 3, 1, 1)))
+    outer = builders.link(
+        None, "Outer", Euler((0.3, 0.2, 0.1)).to_matrix().to_4x4() @ Matrix.Diagonal((1, 3, 1, 1))
+    )
     child = builders.link(data, "Sheared")
     child.parent = outer
     child.matrix_local = Euler((0.0, 0.4, 0.8)).to_matrix().to_4x4()
     builders.link(data, "Mirrored", mirror)
     builders.link(data, "Direct", shear)
     bpy.context.view_layer.update()
-    wanted = sorted(np.array(item.matrix_world).ravel().tolist() for item in bpy.data.objects if item.type == "MESH")
+    wanted = sorted(
+        np.array(item.matrix_world).ravel().tolist()
+        for item in bpy.data.objects
+        if item.type == "MESH"
+    )
     scene, _ = builders.export()
     found = sorted(scene.instances[0]["transforms"].reshape(-1, 16).tolist())
     np.testing.assert_allclose(found, wanted, atol=1e-6)
@@ -179,7 +188,7 @@ def case_particle_instances() -> None:
 
 
 def _instancing_nodes(instance: bpy.types.Object, count: int) -> bpy.types.NodeTree:
-    """Geometry nodes that put `count` instances of an object on a line, besides the geometry itself."""
+    """Geometry nodes that add `count` instances of an object on a line to a geometry."""
     tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
@@ -227,7 +236,9 @@ def case_camera_visibility_and_pass_index() -> None:
     hidden.visible_camera = False
     plain.pass_index = 7
     scene, warnings = builders.export()
-    found = {entry["name"]: (entry["camera_visible"], entry["object_index"]) for entry in scene.instances}
+    found = {
+        entry["name"]: (entry["camera_visible"], entry["object_index"]) for entry in scene.instances
+    }
     assert found == {"Plain": (True, 7), "Hidden": (False, 0)}
     assert not warnings
     hidden.visible_shadow = False
@@ -260,7 +271,10 @@ def case_attributes_that_materials_read() -> None:
     color.data.foreach_set("color", np.arange(16, dtype=np.float32))
     data.attributes.new("Unused", "FLOAT", "POINT")
     entry, tree, output = builders.material()
-    reader, diffuse = tree.nodes.new("ShaderNodeVertexColor"), tree.nodes.new("ShaderNodeBsdfDiffuse")
+    reader, diffuse = (
+        tree.nodes.new("ShaderNodeVertexColor"),
+        tree.nodes.new("ShaderNodeBsdfDiffuse"),
+    )
     reader.layer_name = "Paint"
     tree.links.new(reader.outputs["Color"], diffuse.inputs["Color"])
     tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
@@ -276,7 +290,7 @@ def case_attributes_that_materials_read() -> None:
     assert scene.textures[surface["color"]["texture"]][1]["name"] == "Paint"
 
 
-def case_a_million_triangles_are_quick() -> None:
+def case_large_meshes_are_quick() -> None:
     import time
 
     data = bpy.data.meshes.new("Grid")
@@ -290,6 +304,6 @@ def case_a_million_triangles_are_quick() -> None:
     builders.export()
     start = time.monotonic()
     scene, _ = builders.export()
-    # Half a million triangles; bulk copies take a few hundredths of a second, element-wise access tens.
+    # Half a million triangles: bulk copies take a few hundredths of a second, a Python loop tens.
     assert time.monotonic() - start < 5.0
     assert scene.meshes[0]["face_indices"].size == 500 * 500 * 6

@@ -1,0 +1,154 @@
+"""Worlds: colour, strength, environment maps and their mapping."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Vector
+
+import builders
+
+
+def _dome() -> tuple[dict | None, object, list[str]]:
+    scene, warnings = builders.export()
+    domes = [data for _, data in scene.lights if data["type"] == "dome"]
+    return (domes[0] if domes else None), scene, warnings
+
+
+def case_no_world_and_black_world() -> None:
+    bpy.context.scene.world = None
+    assert _dome()[0] is None
+    _, _, node = builders.world()
+    node.inputs["Strength"].default_value = 0.0
+    assert _dome()[0] is None
+
+
+def case_colour_and_strength() -> None:
+    _, _, node = builders.world()
+    node.inputs["Color"].default_value = (0.1, 0.2, 0.4, 1)
+    node.inputs["Strength"].default_value = 2.0
+    dome, _, warnings = _dome()
+    np.testing.assert_allclose(dome["radiance"], (0.2, 0.4, 0.8), rtol=1e-6)
+    assert "image" not in dome and dome["camera_visible"] and not warnings
+
+
+def case_world_without_nodes() -> None:
+    if bpy.app.version >= (5, 0, 0):
+        return
+    world = bpy.data.worlds.new("Plain")
+    world.color = (0.25, 0.5, 1.0)
+    bpy.context.scene.world = world
+    assert _dome()[0]["radiance"] == [0.25, 0.5, 1.0]
+
+
+def case_sky_switched_off_in_the_view_layer() -> None:
+    builders.world()
+    bpy.context.view_layer.use_sky = False
+    assert _dome()[0] is None
+
+
+def _environment(rotation: tuple, scale: tuple = (1, 1, 1), kind: str = "POINT") -> np.ndarray:
+    """A float picture whose texel (row, column) is unique, behind a Mapping node."""
+    pixels = np.ones((4, 8, 4), np.float32)
+    pixels[..., 0], pixels[..., 1] = np.arange(8)[None, :], np.arange(4)[:, None]
+    _, tree, background = builders.world()
+    image = tree.nodes.new("ShaderNodeTexEnvironment")
+    image.image = builders.image("Sky", pixels, "Non-Color", is_float=True)
+    place, mapping = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
+    mapping.vector_type = kind
+    mapping.inputs["Rotation"].default_value = rotation
+    mapping.inputs["Scale"].default_value = scale
+    tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], image.inputs["Vector"])
+    tree.links.new(image.outputs["Color"], background.inputs["Color"])
+    return pixels
+
+
+def _blender_coordinates(direction: np.ndarray) -> np.ndarray:
+    """Where Blender looks a direction up in an equirectangular picture."""
+    x, y, z = direction
+    return np.array([0.5 - np.arctan2(y, x) / (2 * np.pi), np.arcsin(z) / np.pi + 0.5])
+
+
+def _segue_coordinates(direction: np.ndarray) -> np.ndarray:
+    """The same for the ABI's dome: +Y on top, +Z in the centre, +X a quarter to its left."""
+    x, y, z = direction
+    return np.array([0.5 - np.arctan2(x, z) / (2 * np.pi), np.arcsin(y) / np.pi + 0.5])
+
+
+def case_environment_maps_point_where_blenders_do() -> None:
+    rng = np.random.default_rng(1)
+    for kind in ("POINT", "TEXTURE", "VECTOR"):
+        for rotation, scale in (
+            ((0, 0, 0), (1, 1, 1)),
+            ((0, 0, 1.2), (1, 1, 1)),
+            ((0.3, -0.8, 2.0), (1, 1, 1)),
+            ((0, 0, 0.5), (-1, 1, 1)),
+        ):
+            pixels = _environment(rotation, scale, kind)
+            dome, scene, warnings = _dome()
+            assert not warnings, warnings
+            np.testing.assert_allclose(scene.images[dome["image"]]["pixels"], pixels[..., :3])
+            pose = np.array(dome["transform"]).reshape(4, 4)[:3, :3]
+            matrix = np.array(Euler(rotation).to_matrix()) @ np.diag(scale)
+            if kind == "TEXTURE":
+                matrix = np.linalg.inv(matrix)
+            for direction in rng.normal(size=(20, 3)):
+                direction /= np.linalg.norm(direction)
+                wanted = _blender_coordinates(matrix @ direction)
+                found = _segue_coordinates(np.linalg.inv(pose) @ direction)
+                np.testing.assert_allclose(found, wanted, atol=1e-5, err_msg=f"{kind} {rotation}")
+
+
+def case_stretched_environment_is_named() -> None:
+    _environment((0, 0, 0), (1, 2, 1))
+    _, _, warnings = _dome()
+    assert any("stretches" in text for text in warnings)
+
+
+def case_strength_of_an_image() -> None:
+    pixels = _environment((0, 0, 0))
+    background = next(
+        n for n in bpy.context.scene.world.node_tree.nodes if n.bl_idname == "ShaderNodeBackground"
+    )
+    background.inputs["Strength"].default_value = 3.0
+    dome, scene, _ = _dome()
+    shown = np.array(dome["radiance"]) * scene.images[dome["image"]]["pixels"]
+    np.testing.assert_allclose(shown, 3.0 * pixels[..., :3], rtol=1e-3)
+
+
+def case_unsupported_worlds_are_named() -> None:
+    _environment((0, 0, 0))
+    tree = bpy.context.scene.world.node_tree
+    node = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
+    node.projection = "MIRROR_BALL"
+    dome, _, warnings = _dome()
+    assert any("mirror ball" in text for text in warnings), warnings
+    # The average of the picture stands in.
+    np.testing.assert_allclose(dome["radiance"], (3.5, 1.5, 1.0), rtol=1e-3)
+    assert "image" not in dome
+
+
+def case_camera_rays_may_see_another_background() -> None:
+    """A mix by the Light Path node cannot be told apart; the camera's side is used and named."""
+    _, tree, background = builders.world()
+    other, mix = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeMixShader")
+    path = tree.nodes.new("ShaderNodeLightPath")
+    background.inputs["Color"].default_value = (1, 0, 0, 1)
+    other.inputs["Color"].default_value = (0, 0, 1, 1)
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputWorld")
+    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(background.outputs[0], mix.inputs[1])
+    tree.links.new(other.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs[0])
+    dome, _, warnings = _dome()
+    assert dome["radiance"] == [0.0, 0.0, 1.0]
+    assert any("Light Path" in text for text in warnings), warnings
+
+
+def case_up_is_up() -> None:
+    """The top row of a picture without mapping is the sky above."""
+    _environment((0, 0, 0))
+    dome, _, _ = _dome()
+    pose = Matrix(np.array(dome["transform"]).reshape(4, 4).tolist())
+    assert (pose.to_3x3() @ Vector((0, 1, 0)) - Vector((0, 0, 1))).length < 1e-6
