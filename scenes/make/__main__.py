@@ -11,6 +11,7 @@ NAMES = [
     "door_ajar",
     "glossy_room",
     "lamp",
+    "night_market",
     "pool",
     "still_life",
 ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from . import textures
 from .mesh import Array, Mesh, merged, rotation
-from .shapes import arc, ball, box, curve, height_field, lathe, loft, quad, tube
+from .shapes import ball, box, curve, height_field, lathe, loft, quad, tube
 from .stage import Scene, Texture, placed
 
 LEFT, RIGHT, FRONT, TOP = -2.1, 2.5, 4.3, 2.6
