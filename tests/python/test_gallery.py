@@ -1,4 +1,4 @@
-"""The gallery's stages: whole, valid, within their sizes, and rendered by Segue without a warning."""
+"""The gallery: stages whole, valid, within their sizes, and rendered without a warning."""
 
 from __future__ import annotations
 
