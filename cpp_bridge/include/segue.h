@@ -12,8 +12,9 @@
  *   strings     UTF-8, NUL-terminated, copied; arrays are copied before the call returns
  *   JSON        small structured things (materials, lights, camera, settings) are JSON objects;
  *               unknown keys are errors that name the key. Their schema is docs/abi.md
- *   threads     a handle may be used by one thread at a time, except segue_render_cancel,
- *               segue_render_progress and segue_render_read_pass, which any thread may call at any time
+ *   threads     a handle may be used by one thread at a time, except for segue_render_cancel,
+ *               segue_render_size, segue_render_pass_channels and segue_render_read_pass, which any
+ *               thread may call at any time
  */
 #ifndef SEGUE_H
 #define SEGUE_H

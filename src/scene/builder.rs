@@ -223,6 +223,12 @@ impl Scene {
         &self.groups[self.instances[instance as usize].group as usize]
     }
 
+    /// Whether an instance turns its mesh inside out, so that corners wind the other way round.
+    #[inline]
+    pub fn is_mirrored(&self, instance: u32) -> bool {
+        self.instances[instance as usize].to_world.matrix3.determinant() < 0.0
+    }
+
     /// Index of the material of a triangle of an instance.
     #[inline]
     pub fn material_index(&self, instance: u32, triangle: u32) -> u32 {

@@ -1,5 +1,15 @@
-//! How surfaces scatter light, and how emitters send it out.
+//! How surfaces scatter light, and how emitters send it out; the scene made ready for both.
 
 pub mod bsdf;
 pub mod emitters;
 pub mod lobes;
+
+mod material;
+mod sensor;
+mod surface;
+mod texture;
+mod world;
+
+pub use sensor::{CameraRay, Sensor};
+pub use surface::SurfacePoint;
+pub use world::{BuildCost, LightPoint, LightSample, Piece, Shaded, Vertex, World, WorldError};

@@ -135,6 +135,11 @@ impl Bsdf {
         self.entries().iter().any(|e| !e.delta)
     }
 
+    /// Whether a continuous lobe scatters light to the other side.
+    pub fn transmits(&self) -> bool {
+        self.entries().iter().any(|e| e.lobe.transmits() && !e.delta)
+    }
+
     /// Whether there are lobes, and all are Dirac deltas.
     pub fn is_delta_only(&self) -> bool {
         self.has_delta() && !self.has_smooth()

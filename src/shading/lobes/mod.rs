@@ -191,6 +191,15 @@ impl Lobe {
         }
     }
 
+    /// Whether it scatters light to the other side.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::Lambert(_) | Self::Reflection(_) => false,
+            Self::Dielectric(_) | Self::Transparent(_) => true,
+        }
+    }
+
     /// Refractive index below the surface over that above it: 1 for all but refracting lobes.
     #[inline]
     pub fn eta(&self) -> f32 {

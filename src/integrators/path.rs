@@ -1,0 +1,241 @@
+//! Unidirectional path tracing with next-event estimation: the reference of all other methods.
+//!
+//! Paths start at the camera. At every vertex the light is estimated in two ways, by drawing a point of a
+//! light and by following the BSDF to one; both are weighted by the power heuristic (Veach 1997, section
+//! 9.2). Paths end by Russian roulette, which leaves the mean as it is, or where nothing is hit.
+
+use super::{Context, Integrator};
+use crate::film::{FirstHit, Sample, SharedTile};
+use crate::math::Sampler;
+use crate::shading::bsdf::{Bsdf, Walk};
+use crate::shading::emitters::Receiver;
+use crate::shading::lobes::Density;
+use crate::shading::{CameraRay, LightPoint, Piece, Shaded, SurfacePoint, Vertex, World};
+use glam::{Vec2, Vec3};
+use std::sync::atomic::Ordering::Relaxed;
+
+/// The path tracer.
+#[derive(Debug, Default)]
+pub struct Path;
+
+/// Vertices before roulette begins: short paths carry most of the picture.
+const ROULETTE_FROM: u32 = 3;
+/// From here on even a path that loses nothing may end, so that a closed white scene does too.
+const ROULETTE_ALWAYS_FROM: u32 = 64;
+const MAX_SURVIVAL: f32 = 0.99;
+
+impl Integrator for Path {
+    fn iterate(&mut self, context: &Context, iteration: u32) {
+        use rayon::prelude::*;
+        context.film.par_tiles().for_each(|tile| {
+            if !context.stop.is_raised() {
+                render_tile(context, iteration, tile);
+                (context.tile_done)(tile.rect());
+            }
+        });
+    }
+}
+
+fn render_tile(context: &Context, iteration: u32, shared: &SharedTile) {
+    let mut rays = 0;
+    let mut tile = shared.lock();
+    for (x, y) in shared.rect().pixels() {
+        if context.stop.is_raised() {
+            break;
+        }
+        let (full_x, full_y) = (x + context.crop.x, y + context.crop.y);
+        let stream = full_y.wrapping_mul(1 << 16) ^ full_x;
+        // even and odd samples are two independent sequences, as the film's two halves must be
+        let sampler = Sampler::new(context.seed ^ ((iteration & 1) << 31), stream, iteration >> 1);
+        let mut walk = PathWalk { context, sampler, rays: 0 };
+        tile.add(x, y, &walk.sample(Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5)));
+        rays += walk.rays;
+    }
+    context.counters.rays.fetch_add(rays, Relaxed);
+}
+
+/// The state of the walk along one path.
+struct Throughput {
+    /// Product of BSDF values over densities, for basic radiance.
+    weight: Vec3,
+    /// Product of `1 / eta^2` over refractions: basic radiance to radiance.
+    basic_to_radiance: f32,
+}
+
+impl Throughput {
+    fn radiance(&self) -> Vec3 {
+        self.weight * self.basic_to_radiance
+    }
+}
+
+/// Where the last direction came from, for the weight of light that is hit by it.
+#[derive(Clone, Copy)]
+enum Origin {
+    /// The camera, or a delta lobe: no other technique could have found the light.
+    Delta,
+    /// A continuous lobe at a vertex, with its density per solid angle.
+    Vertex { receiver: Receiver, pdf: f32 },
+}
+
+struct PathWalk<'a, 'b> {
+    context: &'a Context<'b>,
+    sampler: Sampler,
+    rays: u64,
+}
+
+/// Weight of a technique of density `a` beside one of density `b` (power heuristic, exponent 2).
+fn power_heuristic(a: f32, b: f32) -> f32 {
+    // the ratio form neither overflows nor divides infinity by infinity
+    let r = b / a;
+    if r.is_finite() { 1.0 / (1.0 + r * r) } else { 0.0 }
+}
+
+impl PathWalk<'_, '_> {
+    fn world(&self) -> &World {
+        self.context.world
+    }
+
+    /// One sample of the pixel whose centre is at `centre`.
+    fn sample(&mut self, centre: Vec2) -> Sample {
+        let film = centre + self.context.filter.sample(self.sampler.next_2d());
+        let lens = if self.world().needs().depth_of_field { self.sampler.next_2d() } else { Vec2::ZERO };
+        let ray = self.context.sensor.ray(film, lens);
+        let mut sample = Sample { alpha: 1.0, ..Sample::default() };
+        self.trace(&ray, &mut sample);
+        sample
+    }
+
+    fn trace(&mut self, camera: &CameraRay, sample: &mut Sample) {
+        let context = self.context;
+        let world = context.world;
+        let mut throughput = Throughput { weight: Vec3::ONE, basic_to_radiance: 1.0 };
+        let mut origin = Origin::Delta;
+        let mut piece = Piece::from_camera(camera);
+        for depth in 0.. {
+            let from_camera = depth == 0;
+            let mut found = Vec3::ZERO;
+            // through holes and transparent surfaces until something scatters
+            let end = loop {
+                self.rays += 1;
+                let hit = world.closest(&piece, from_camera);
+                world.for_each_light_on(&piece, hit.as_ref(), from_camera, |light| {
+                    found += throughput.radiance() * light.radiance * self.hit_weight(origin, light);
+                });
+                let Some(hit) = hit else { break None };
+                let choice = if world.needs().transparency { self.sampler.next_1d() } else { 0.0 };
+                match world.shade(&hit, -piece.direction, choice) {
+                    Shaded::Through { weight } => {
+                        throughput.weight *= weight;
+                        piece = piece.beyond(&hit);
+                    }
+                    Shaded::Scatters { weight, vertex } => {
+                        throughput.weight *= weight;
+                        break Some((hit, vertex));
+                    }
+                }
+            };
+            let Some((hit, vertex)) = end else {
+                world.for_each_infinite_light(&piece, from_camera, |light| {
+                    if !(from_camera && context.transparent_background) {
+                        found += throughput.radiance() * light.radiance * self.hit_weight(origin, light);
+                    }
+                });
+                record(sample, depth, found);
+                if from_camera && context.transparent_background {
+                    sample.alpha = 1.0 - throughput.weight.element_sum() / 3.0;
+                }
+                return;
+            };
+            if vertex.emission != Vec3::ZERO {
+                let light = world.emitter_at(&piece, &hit, vertex.emission);
+                let weight = light.map_or(1.0, |light| self.hit_weight(origin, light));
+                found += throughput.radiance() * vertex.emission * weight;
+            }
+            record(sample, depth, found);
+            if from_camera {
+                sample.first_hit = Some(self.first_hit(&hit, &vertex, -piece.direction));
+            }
+            if context.max_depth.is_some_and(|d| depth >= d) {
+                return;
+            }
+
+            let wo = -piece.direction;
+            let bsdf = &vertex.bsdf;
+            let receiver = hit.receiver(bsdf, wo);
+            if bsdf.has_smooth() {
+                let direct = self.next_event(&hit, &receiver, bsdf, wo) * throughput.radiance();
+                record(sample, depth + 1, direct);
+            }
+            let Some(s) = bsdf.sample(wo, Walk::Camera, self.sampler.next_3d()) else { return };
+            throughput.weight *= s.weight();
+            throughput.basic_to_radiance /= s.eta * s.eta;
+            origin = match s.pdf {
+                Density::Discrete(_) => Origin::Delta,
+                Density::Projected(pdf) => {
+                    Origin::Vertex { receiver, pdf: pdf.to_solid_angle(hit.place.normal.dot(s.direction)).0 }
+                }
+            };
+            let u = self.sampler.next_1d();
+            if depth >= ROULETTE_FROM {
+                // by basic radiance: a path inside glass is not worth less than outside
+                let ceiling = if depth >= ROULETTE_ALWAYS_FROM { MAX_SURVIVAL } else { 1.0 };
+                let survival = throughput.weight.max_element().min(ceiling);
+                if !(u < survival) {
+                    return;
+                }
+                throughput.weight /= survival;
+            }
+            piece = Piece::leaving(&hit, s.direction);
+        }
+    }
+
+    /// Weight of light that was found by the direction from `origin`.
+    fn hit_weight(&self, origin: Origin, light: LightPoint) -> f32 {
+        match origin {
+            Origin::Delta => 1.0,
+            Origin::Vertex { receiver, pdf } => {
+                power_heuristic(pdf, self.world().pdf_of_sampling(&receiver, &light))
+            }
+        }
+    }
+
+    /// Light that reaches the vertex from a drawn point of a light, scattered towards `wo`.
+    fn next_event(&mut self, hit: &SurfacePoint, receiver: &Receiver, bsdf: &Bsdf, wo: Vec3) -> Vec3 {
+        let u = self.sampler.next_3d();
+        let world = self.context.world;
+        let Some(light) = world.sample_light(receiver, u) else { return Vec3::ZERO };
+        let cos = hit.place.normal.dot(light.direction).abs();
+        let f = bsdf.eval(wo, light.direction) * cos;
+        if f == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        let weight = match light.is_delta {
+            true => 1.0,
+            false => power_heuristic(light.pdf, bsdf.pdf(wo, light.direction).0 * cos),
+        };
+        f * light.radiance * (weight / light.pdf) * world.transmittance(hit, &light, &mut self.rays)
+    }
+
+    fn first_hit(&self, hit: &SurfacePoint, vertex: &Vertex, wo: Vec3) -> FirstHit {
+        let world = self.world();
+        FirstHit {
+            depth: self.context.sensor.depth(hit.place.position),
+            position: world.absolute(hit.place.position),
+            normal: hit.ns,
+            albedo: vertex.bsdf.albedo(wo).clamp(Vec3::ZERO, Vec3::ONE),
+            uv: world.uv(hit),
+            object_index: world.scene().group(hit.instance).object_index,
+            material_index: world.scene().materials[hit.material as usize].pass_index,
+        }
+    }
+}
+
+/// Adds light that was scattered `bounces` times on its way to the camera.
+fn record(sample: &mut Sample, bounces: u32, light: Vec3) {
+    sample.radiance += light;
+    match bounces {
+        0 => sample.emission += light,
+        1 => sample.direct += light,
+        _ => {}
+    }
+}

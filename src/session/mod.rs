@@ -1,0 +1,380 @@
+//! The render loop as the outside sees it: start, iterate until a limit, progress, cancel, snapshots,
+//! statistics.
+
+pub mod clock;
+pub mod settings;
+pub mod statistics;
+
+use crate::film::{Film, FilmError, Rect};
+use crate::integrators::path::Path;
+use crate::integrators::{Context, Counters, Integrator, StopSign};
+use crate::scene::{Scene, SceneError};
+use crate::shading::{BuildCost, Sensor, World, WorldError};
+use clock::Stopwatch;
+use serde::Serialize;
+use settings::{Method, Settings};
+use statistics::{CurvePoint, Stage, Statistics, StopReason};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Why a render could not be set up.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum SessionError {
+    #[error("{0}")]
+    Settings(String),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    World(#[from] WorldError),
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    #[error("the threads could not be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    #[error("a defect of the engine: {0}")]
+    Panic(String),
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Progress {
+    /// Share of the work that is done, in [0,1], by the nearest limit.
+    pub fraction: f64,
+    /// Seconds of rendering so far.
+    pub seconds: f64,
+    /// Expected seconds to the end.
+    pub remaining: Option<f64>,
+    /// Samples a pixel so far.
+    pub samples: f64,
+    /// Last estimate of the relative mean squared error.
+    pub estimated_error: Option<f64>,
+    /// What is being done.
+    pub stage: &'static str,
+}
+
+/// Receives news of a running render, on the thread that runs it.
+pub trait Events {
+    /// How far it is. Returning `true` cancels.
+    fn progress(&mut self, progress: &Progress) -> bool;
+    /// A rectangle of the film has new content.
+    fn tile(&mut self, rect: Rect);
+}
+
+/// A render: a scene, ready to be traced, and a film that fills.
+pub struct Session {
+    settings: Settings,
+    world: World,
+    sensor: Sensor,
+    film: Film,
+    pool: rayon::ThreadPool,
+    build: BTreeMap<String, Stage>,
+    warnings: Vec<String>,
+    counters: Counters,
+    stop: StopSign,
+    cancelled: AtomicBool,
+    state: Mutex<State>,
+}
+
+/// What changes from iteration to iteration.
+struct State {
+    iterations: u32,
+    seconds: f64,
+    cpu_seconds: f64,
+    estimated_error: Option<f64>,
+    curve: Vec<CurvePoint>,
+    next_curve_point: f64,
+    stop_reason: StopReason,
+}
+
+/// Least number of samples a pixel on which an error is estimated.
+const MIN_SAMPLES_FOR_ERROR: u32 = 4;
+/// Ratio of the run times at which neighbouring points of the error curve are taken.
+const CURVE_RATIO: f64 = 1.25;
+/// Time between looks at the clock and calls of the progress callback.
+const POLL: Duration = Duration::from_millis(20);
+/// Side of the rectangles in which new content is announced, pixels.
+const ANNOUNCED: u32 = 256;
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // what a panicking thread left behind are whole numbers, still good to read
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Session {
+    /// Builds what rendering the scene needs.
+    pub fn new(scene: Scene, settings: Settings) -> Result<Self, SessionError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(settings.threads).build()?;
+        let film = Film::new(settings.crop.width, settings.crop.height, settings.passes)?;
+        let sensor = Sensor::new(&scene.camera, settings.resolution[0], settings.resolution[1]);
+        let world = pool.install(|| World::new(Arc::new(scene), settings.keep_all))?;
+        let cost = |c: &BuildCost| (c.name.to_string(), Stage { seconds: c.seconds, bytes: c.bytes });
+        let mut build: BTreeMap<String, Stage> = world.costs().iter().map(cost).collect();
+        let bytes = Film::memory_bytes(film.width(), film.height(), settings.passes);
+        build.insert("film".into(), Stage { seconds: 0.0, bytes });
+        Ok(Self {
+            sensor,
+            film,
+            pool,
+            build,
+            warnings: world.warnings().lines(),
+            world,
+            settings,
+            counters: Counters::default(),
+            stop: StopSign::default(),
+            cancelled: AtomicBool::new(false),
+            state: Mutex::new(State {
+                iterations: 0,
+                seconds: 0.0,
+                cpu_seconds: 0.0,
+                estimated_error: None,
+                curve: Vec::new(),
+                next_curve_point: 0.0,
+                stop_reason: StopReason::Running,
+            }),
+        })
+    }
+
+    /// The film; may be read at any time.
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The scene as it is rendered.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Stops a running render as soon as its workers notice, or the next one before it begins.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Relaxed);
+        self.stop.raise();
+    }
+
+    /// Renders until a limit is reached or it is cancelled. Run again, it starts from where it stopped,
+    /// with its time limit anew.
+    pub fn run(&self, events: &mut dyn Events) -> Result<StopReason, SessionError> {
+        let mut integrator: Box<dyn Integrator> = match self.settings.method {
+            Method::Path => Box::new(Path),
+        };
+        locked(&self.state).stop_reason = StopReason::Running;
+        let watch = Stopwatch::start();
+        let (before, cpu_before) = {
+            let s = locked(&self.state);
+            (s.seconds, s.cpu_seconds)
+        };
+        let announcements = Announcements::new(self.film.rect());
+        let (done, finished) = channel();
+        let reason = std::thread::scope(|scope| {
+            let worker = scope.spawn(|| {
+                let tile_done = |rect: Rect| announcements.add(rect);
+                let reason = self.iterate(&mut *integrator, &tile_done, &watch, (before, cpu_before));
+                // nobody listens any more only if the listener panicked
+                let _ = done.send(());
+                reason
+            });
+            let mut last_tiles = 0.0;
+            loop {
+                let over = !matches!(finished.recv_timeout(POLL), Err(RecvTimeoutError::Timeout));
+                let seconds = watch.seconds();
+                if !self.cancelled.load(Relaxed) && events.progress(&self.progress(before + seconds)) {
+                    self.cancel();
+                }
+                if self.settings.limits.seconds.is_some_and(|limit| seconds >= limit) {
+                    self.stop.raise();
+                }
+                // showing pixels costs time: often at first, then ever more rarely
+                if over || seconds - last_tiles > (0.1 * seconds).clamp(0.25, 5.0) {
+                    last_tiles = seconds;
+                    announcements.take().into_iter().for_each(|r| events.tile(r));
+                }
+                if over {
+                    return worker.join();
+                }
+            }
+        });
+        self.stop.lower();
+        let cancelled = self.cancelled.swap(false, Relaxed);
+        let reason = reason.map_err(|panic| SessionError::Panic(panic_text(&*panic)))?;
+        let reason = if cancelled { StopReason::Cancelled } else { reason };
+        let mut state = locked(&self.state);
+        state.stop_reason = reason;
+        Ok(reason)
+    }
+
+    fn iterate(
+        &self,
+        integrator: &mut dyn Integrator,
+        tile_done: &(dyn Fn(Rect) + Sync),
+        watch: &Stopwatch,
+        (before, cpu_before): (f64, f64),
+    ) -> StopReason {
+        let context = Context {
+            world: &self.world,
+            sensor: &self.sensor,
+            film: &self.film,
+            crop: self.settings.crop,
+            filter: &self.settings.filter,
+            max_depth: self.settings.max_depth,
+            seed: self.settings.seed,
+            transparent_background: self.settings.transparent_background,
+            stop: &self.stop,
+            counters: &self.counters,
+            tile_done,
+        };
+        let limits = self.settings.limits;
+        loop {
+            let iteration = locked(&self.state).iterations;
+            if limits.samples.is_some_and(|n| iteration >= n) {
+                self.note(watch, before, cpu_before, true);
+                return StopReason::Samples;
+            }
+            if !self.stop.is_raised() {
+                self.pool.install(|| integrator.iterate(&context, iteration));
+            }
+            if self.stop.is_raised() {
+                self.note(watch, before, cpu_before, true);
+                return StopReason::Time;
+            }
+            let mut state = locked(&self.state);
+            // a number beyond 2^32 iterations would only repeat samples
+            state.iterations = state.iterations.saturating_add(1);
+            drop(state);
+            let error = self.note(watch, before, cpu_before, false);
+            if let (Some(limit), Some(error)) = (limits.error, error)
+                && error <= limit
+            {
+                return StopReason::Error;
+            }
+        }
+    }
+
+    /// Keeps the clock, and at growing intervals (or at the `end`) estimates the error. Returns an estimate
+    /// only where it is new.
+    fn note(&self, watch: &Stopwatch, before: f64, cpu_before: f64, end: bool) -> Option<f64> {
+        let mut state = locked(&self.state);
+        state.seconds = before + watch.seconds();
+        state.cpu_seconds = cpu_before + watch.cpu_seconds();
+        if !end && state.seconds < state.next_curve_point {
+            return None;
+        }
+        state.next_curve_point = state.seconds * CURVE_RATIO;
+        let enough = state.iterations >= MIN_SAMPLES_FOR_ERROR;
+        let estimate = enough.then(|| self.pool.install(|| self.film.estimated_relmse())).flatten();
+        state.estimated_error = estimate.or(state.estimated_error);
+        let point = CurvePoint {
+            seconds: state.seconds,
+            cpu_seconds: state.cpu_seconds,
+            samples: self.mean_samples(),
+            estimated_error: estimate,
+        };
+        state.curve.push(point);
+        estimate
+    }
+
+    fn mean_samples(&self) -> f64 {
+        self.film.total_samples() as f64 / self.film.rect().area() as f64
+    }
+
+    fn progress(&self, seconds: f64) -> Progress {
+        let state = locked(&self.state);
+        let limits = &self.settings.limits;
+        let samples = state.iterations as f64;
+        let by_samples = limits.samples.map(|n| samples / n as f64);
+        let by_time = limits.seconds.map(|t| seconds / t);
+        // the error falls as one over the samples
+        let by_error = limits.error.zip(state.estimated_error).map(|(limit, e)| limit / e);
+        let fraction =
+            [by_samples, by_time, by_error].into_iter().flatten().fold(0.0, f64::max).clamp(0.0, 1.0);
+        Progress {
+            fraction,
+            seconds,
+            remaining: (fraction > 0.0).then(|| seconds * (1.0 - fraction) / fraction),
+            samples,
+            estimated_error: state.estimated_error,
+            stage: "rendering",
+        }
+    }
+
+    /// How far the render is.
+    pub fn current_progress(&self) -> Progress {
+        let seconds = locked(&self.state).seconds;
+        self.progress(seconds)
+    }
+
+    /// The figures so far.
+    pub fn statistics(&self) -> Statistics {
+        let state = locked(&self.state);
+        let mut stages = self.build.clone();
+        let sampling = Stage { seconds: state.seconds, bytes: 0 };
+        stages.insert("sampling".into(), sampling);
+        Statistics {
+            integrator: serde_json::to_value(self.settings.method)
+                .ok()
+                .and_then(|v| v.as_str().map(String::from))
+                .unwrap_or_default(),
+            seconds: state.seconds,
+            cpu_seconds: state.cpu_seconds,
+            build_seconds: self.build.values().map(|s| s.seconds).sum(),
+            samples: self.mean_samples(),
+            rays: self.counters.rays.load(Relaxed),
+            peak_memory_bytes: clock::peak_memory_bytes(),
+            non_finite: self.film.rejected_samples(),
+            estimated_error: state.estimated_error,
+            threads: self.pool.current_num_threads(),
+            seed: self.settings.seed,
+            width: self.film.width(),
+            height: self.film.height(),
+            stop_reason: state.stop_reason,
+            stages,
+            left_out: self.world.needs().left_out(),
+            warnings: self.warnings.clone(),
+            curve: state.curve.clone(),
+        }
+    }
+}
+
+/// The text of a panic's payload.
+pub fn panic_text(payload: &(dyn std::any::Any + Send)) -> String {
+    payload
+        .downcast_ref::<&str>()
+        .map(|s| s.to_string())
+        .or_else(|| payload.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "a panic without a message".into())
+}
+
+/// Parts of the film with new content, gathered between announcements.
+struct Announcements {
+    film: Rect,
+    across: u32,
+    dirty: Vec<AtomicU32>,
+}
+
+impl Announcements {
+    fn new(film: Rect) -> Self {
+        let (across, down) = (film.width.div_ceil(ANNOUNCED), film.height.div_ceil(ANNOUNCED));
+        Self { film, across, dirty: (0..across * down).map(|_| AtomicU32::new(0)).collect() }
+    }
+
+    fn add(&self, tile: Rect) {
+        let block = tile.y / ANNOUNCED * self.across + tile.x / ANNOUNCED;
+        self.dirty[block as usize].store(1, Relaxed);
+    }
+
+    fn take(&self) -> Vec<Rect> {
+        let blocks = self.dirty.iter().enumerate().filter(|(_, d)| d.swap(0, Relaxed) != 0);
+        blocks
+            .filter_map(|(i, _)| {
+                let (x, y) = (i as u32 % self.across * ANNOUNCED, i as u32 / self.across * ANNOUNCED);
+                Rect::new(x, y, ANNOUNCED, ANNOUNCED).intersection(&self.film)
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,178 @@
+//! What is asked of a render.
+
+use crate::film::{Filter, FilterKind, Pass, PassSet, Rect};
+use serde::{Deserialize, Serialize};
+
+/// The integrators there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Unidirectional path tracing with next-event estimation.
+    #[default]
+    Path,
+}
+
+/// Validated settings of a render.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// How light transport is computed.
+    pub method: Method,
+    /// Width and height of the full film.
+    pub resolution: [u32; 2],
+    /// The part of the film that is rendered.
+    pub crop: Rect,
+    /// When to stop.
+    pub limits: Limits,
+    /// Bounces; `None` is unlimited.
+    pub max_depth: Option<u32>,
+    /// Threads; 0 is all.
+    pub threads: usize,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Pixel filter.
+    pub filter: Filter,
+    /// Whether what lies behind everything is transparent.
+    pub transparent_background: bool,
+    /// Passes to keep.
+    pub passes: PassSet,
+    /// Leave nothing out.
+    pub keep_all: bool,
+}
+
+/// When a render stops: at whichever limit comes first. At least one is set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Samples a pixel.
+    pub samples: Option<u32>,
+    /// Seconds of rendering.
+    pub seconds: Option<f64>,
+    /// Estimated relative mean squared error.
+    pub error: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Json {
+    integrator: Method,
+    resolution: [u32; 2],
+    crop: Option<[u32; 4]>,
+    samples: u32,
+    time: f64,
+    noise_threshold: f64,
+    max_depth: i64,
+    threads: usize,
+    seed: u32,
+    filter: FilterKind,
+    filter_width: f32,
+    transparent_background: bool,
+    passes: Vec<String>,
+    keep_all: bool,
+}
+
+impl Default for Json {
+    fn default() -> Self {
+        Self {
+            integrator: Method::default(),
+            resolution: [0, 0],
+            crop: None,
+            samples: 0,
+            time: 0.0,
+            noise_threshold: 0.0,
+            max_depth: -1,
+            threads: 0,
+            seed: 0,
+            filter: FilterKind::default(),
+            filter_width: 0.0,
+            transparent_background: false,
+            passes: vec!["Combined".into()],
+            keep_all: false,
+        }
+    }
+}
+
+/// Most threads a render may ask for.
+const MAX_THREADS: usize = 1024;
+
+impl Settings {
+    /// Reads and checks the JSON of `docs/abi.md`; the error says what is wrong with which key.
+    pub fn from_json(json: &str) -> Result<Self, String> {
+        let j: Json = serde_json::from_str(json).map_err(|e| format!("settings: {e}"))?;
+        let [w, h] = j.resolution;
+        if w == 0 || h == 0 {
+            return Err(format!("settings: resolution is {w} x {h}"));
+        }
+        let [x0, y0, x1, y1] = j.crop.unwrap_or([0, 0, w, h]);
+        if x0 >= x1 || y0 >= y1 || x1 > w || y1 > h {
+            return Err(format!(
+                "settings: crop [{x0}, {y0}, {x1}, {y1}] is not a rectangle of {w} x {h} pixels"
+            ));
+        }
+        let limit = |what: &str, v: f64| match v {
+            0.0 => Ok(None),
+            v if v > 0.0 && v.is_finite() => Ok(Some(v)),
+            v => Err(format!("settings: {what} is {v}")),
+        };
+        let limits = Limits {
+            samples: (j.samples > 0).then_some(j.samples),
+            seconds: limit("time", j.time)?,
+            error: limit("noise_threshold", j.noise_threshold)?,
+        };
+        if limits == (Limits { samples: None, seconds: None, error: None }) {
+            return Err("settings: one of samples, time and noise_threshold must be set".into());
+        }
+        if j.threads > MAX_THREADS {
+            return Err(format!("settings: {} threads, allowed are {MAX_THREADS}", j.threads));
+        }
+        // the picture itself is always kept
+        let mut passes = PassSet::default();
+        for name in &j.passes {
+            let pass: Pass = name.parse().map_err(|e| format!("settings: {e}"))?;
+            passes = passes.with(pass);
+        }
+        Ok(Self {
+            method: j.integrator,
+            resolution: j.resolution,
+            crop: Rect::new(x0, y0, x1 - x0, y1 - y0),
+            limits,
+            max_depth: match j.max_depth {
+                -1 => None,
+                d => Some(u32::try_from(d).map_err(|_| format!("settings: max_depth is {d}"))?),
+            },
+            threads: j.threads,
+            seed: j.seed,
+            filter: Filter::new(j.filter, j.filter_width).map_err(|e| format!("settings: {e}"))?,
+            transparent_background: j.transparent_background,
+            passes,
+            keep_all: j.keep_all,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_settings_are_refused_with_their_key() {
+        for (json, what) in [
+            (r#"{"samples":1}"#, "resolution"),
+            (r#"{"resolution":[4,4]}"#, "noise_threshold"),
+            (r#"{"resolution":[4,4],"time":-1}"#, "time"),
+            (r#"{"resolution":[4,4],"samples":1,"crop":[0,0,5,4]}"#, "crop"),
+            (r#"{"resolution":[4,4],"samples":1,"passes":["Colour"]}"#, "Colour"),
+            (r#"{"resolution":[4,4],"samples":1,"max_depth":-2}"#, "max_depth"),
+            (r#"{"resolution":[4,4],"samples":1,"integrator":"magic"}"#, "magic"),
+            (r#"{"resolution":[4,4],"samples":1,"spp":1}"#, "spp"),
+        ] {
+            let e = Settings::from_json(json).unwrap_err();
+            assert!(e.contains(what), "{json}: {e}");
+        }
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_document() {
+        let s = Settings::from_json(r#"{"resolution":[40,30],"samples":8}"#).unwrap();
+        assert_eq!((s.method, s.max_depth, s.crop), (Method::Path, None, Rect::new(0, 0, 40, 30)));
+        assert_eq!(s.limits, Limits { samples: Some(8), seconds: None, error: None });
+    }
+}

@@ -1,0 +1,218 @@
+//! Materials at a surface point: the tree of closures becomes a BSDF, an emission and a transparency.
+
+use super::bsdf::{Bsdf, BsdfBuilder};
+use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, Reflection};
+use super::surface::{SurfacePoint, normal_matrix, normalize_any};
+use super::texture::{MeshPoint, TextureSet};
+use crate::math::Frame;
+use crate::scene::Scene;
+use crate::scene::material::{Closure, NormalMap, NormalSpace, PrincipledClosure, Value};
+use crate::scene::needs::may_be_transparent;
+use glam::{Mat3, Vec3};
+use std::f32::consts::TAU;
+use std::sync::Arc;
+
+/// All materials of a scene, ready to be evaluated.
+#[derive(Debug)]
+pub struct Materials {
+    scene: Arc<Scene>,
+    textures: TextureSet,
+    /// For each material, whether light may pass straight through.
+    transparent: Vec<bool>,
+}
+
+impl Materials {
+    /// Prepares the materials of a scene.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let transparent = scene.materials.iter().map(|m| may_be_transparent(m, &scene)).collect();
+        Self { textures: TextureSet::new(scene.clone()), transparent, scene }
+    }
+
+    /// Whether light may pass straight through a material somewhere.
+    #[inline]
+    pub fn may_be_transparent(&self, material: u32) -> bool {
+        self.transparent[material as usize]
+    }
+
+    /// Share of the surface that is there; in [0,1].
+    pub fn opacity(&self, material: u32, at: &MeshPoint) -> f32 {
+        self.textures.number(&self.scene.materials[material as usize].opacity, at).clamp(0.0, 1.0)
+    }
+
+    /// Share of light that passes straight through; in [0,1] a channel.
+    pub fn transparency(&self, material: u32, at: &MeshPoint) -> Vec3 {
+        let opacity = self.opacity(material, at);
+        let through = self.straight(&self.scene.materials[material as usize].surface, at);
+        (Vec3::splat(1.0 - opacity) + opacity * through).clamp(Vec3::ZERO, Vec3::ONE)
+    }
+
+    /// Sum of the transparent closures.
+    fn straight(&self, closure: &Closure, at: &MeshPoint) -> Vec3 {
+        match closure {
+            Closure::Transparent { color } => self.textures.color(color, at).max(Vec3::ZERO),
+            Closure::Mix { factor, a, b } => {
+                let f = self.textures.number(factor, at).clamp(0.0, 1.0);
+                self.straight(a, at) * (1.0 - f) + self.straight(b, at) * f
+            }
+            Closure::Add { a, b } => self.straight(a, at) + self.straight(b, at),
+            _ => Vec3::ZERO,
+        }
+    }
+
+    /// Radiance that the material emits where it is, on the sides that emit. Not weighted by opacity.
+    pub fn emission(&self, material: u32, at: &MeshPoint) -> Vec3 {
+        let e = self.emitted(&self.scene.materials[material as usize].surface, at);
+        // what is negative or not finite in a texture is no light
+        let clean = |v: f32| if v.is_finite() { v.max(0.0) } else { 0.0 };
+        Vec3::new(clean(e.x), clean(e.y), clean(e.z))
+    }
+
+    fn emitted(&self, closure: &Closure, at: &MeshPoint) -> Vec3 {
+        let product = |color: &Value, strength: &Value| match strength.is(0.0) {
+            true => Vec3::ZERO,
+            false => self.textures.color(color, at) * self.textures.number(strength, at),
+        };
+        match closure {
+            Closure::Emission { color, strength } => product(color, strength),
+            Closure::Principled(p) => product(&p.emission_color, &p.emission_strength),
+            Closure::Mix { factor, a, b } => {
+                let f = self.textures.number(factor, at).clamp(0.0, 1.0);
+                self.emitted(a, at) * (1.0 - f) + self.emitted(b, at) * f
+            }
+            Closure::Add { a, b } => self.emitted(a, at) + self.emitted(b, at),
+            _ => Vec3::ZERO,
+        }
+    }
+
+    /// The scattering at a point. Transparent closures are not in it: they belong to visibility.
+    pub fn bsdf(&self, p: &SurfacePoint) -> Bsdf {
+        let mut builder = BsdfBuilder::new(p.place.normal);
+        self.push(&mut builder, &self.scene.materials[p.material as usize].surface, Vec3::ONE, p);
+        builder.build()
+    }
+
+    fn push(&self, builder: &mut BsdfBuilder, closure: &Closure, weight: Vec3, p: &SurfacePoint) {
+        let color = |v: &Value| self.textures.color(v, &p.at).max(Vec3::ZERO);
+        let number = |v: &Value| self.textures.number(v, &p.at);
+        let frame = |n: &Option<NormalMap>| self.frame(n.as_ref(), p);
+        match closure {
+            Closure::Diffuse { color: c, roughness, normal } => {
+                let _ = roughness;
+                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Lambert(Lambert));
+            }
+            Closure::Glossy { color: c, roughness, anisotropy, rotation, normal } => {
+                let _ = anisotropy;
+                let ggx = Ggx::from_roughness(number(roughness));
+                let frame = rotated(self.tangent_frame(normal.as_ref(), p), number(rotation));
+                let fresnel = Fresnel::constant(color(c).min(Vec3::ONE));
+                builder.push(weight, frame, Lobe::Reflection(Reflection::new(ggx, fresnel)));
+            }
+            Closure::Glass { color: c, roughness, ior, normal } => {
+                let ggx = Ggx::from_roughness(number(roughness));
+                let lobe = Dielectric::new(ggx, sane_ior(number(ior)));
+                builder.push(weight * color(c), frame(normal), Lobe::Dielectric(lobe));
+            }
+            Closure::Refraction { color: c, roughness, ior, normal } => {
+                let ggx = Ggx::from_roughness(number(roughness));
+                let lobe = Dielectric::refraction_only(ggx, sane_ior(number(ior)));
+                builder.push(weight * color(c), frame(normal), Lobe::Dielectric(lobe));
+            }
+            Closure::Translucent { color: c, normal } | Closure::Sheen { color: c, normal, .. } => {
+                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Lambert(Lambert));
+            }
+            Closure::Principled(c) => self.push_principled(builder, c, weight, p),
+            Closure::Mix { factor, a, b } => {
+                let f = number(factor).clamp(0.0, 1.0);
+                if f < 1.0 {
+                    self.push(builder, a, weight * (1.0 - f), p);
+                }
+                if f > 0.0 {
+                    self.push(builder, b, weight * f, p);
+                }
+            }
+            Closure::Add { a, b } => {
+                self.push(builder, a, weight, p);
+                self.push(builder, b, weight, p);
+            }
+            Closure::Transparent { .. } | Closure::Emission { .. } => {}
+        }
+    }
+
+    fn push_principled(
+        &self,
+        builder: &mut BsdfBuilder,
+        c: &PrincipledClosure,
+        weight: Vec3,
+        p: &SurfacePoint,
+    ) {
+        let color = |v: &Value| self.textures.color(v, &p.at).max(Vec3::ZERO);
+        let number = |v: &Value| self.textures.number(v, &p.at);
+        let unit = |v: &Value| number(v).clamp(0.0, 1.0);
+        let frame = self.frame(c.normal.as_ref(), p);
+        let ggx = Ggx::from_roughness(unit(&c.roughness));
+        let base = color(&c.base_color).min(Vec3::ONE);
+        let (metallic, transmission) = (unit(&c.metallic), unit(&c.transmission));
+        let metal = Reflection::new(ggx, Fresnel::constant(base));
+        builder.push(weight * metallic, frame, Lobe::Reflection(metal));
+        let weight = weight * (1.0 - metallic);
+        let glass = Dielectric::new(ggx, sane_ior(number(&c.ior)));
+        builder.push(weight * transmission * base, frame, Lobe::Dielectric(glass));
+        builder.push(weight * (1.0 - transmission) * base, frame, Lobe::Lambert(Lambert));
+    }
+
+    /// The shading frame, with a normal map where there is one.
+    fn frame(&self, map: Option<&NormalMap>, p: &SurfacePoint) -> Frame {
+        match map {
+            None => Frame::from_normal(p.ns),
+            Some(map) => Frame::from_normal(self.mapped_normal(map, p)),
+        }
+    }
+
+    /// The shading frame with its x axis along the u direction of the first UV set.
+    fn tangent_frame(&self, map: Option<&NormalMap>, p: &SurfacePoint) -> Frame {
+        let n = map.map_or(p.ns, |map| self.mapped_normal(map, p));
+        let tangent = self.textures.uv_set("", p.at.mesh).map_or(Vec3::ZERO, |i| p.tangent(&self.scene, i));
+        Frame::from_normal_tangent(n, tangent)
+    }
+
+    fn mapped_normal(&self, map: &NormalMap, p: &SurfacePoint) -> Vec3 {
+        let v = self.textures.lookup(map.texture, &p.at).truncate();
+        let n = match map.space {
+            NormalSpace::World => v,
+            NormalSpace::Object => {
+                let m = Mat3::from(self.scene.instances[p.instance as usize].to_world.matrix3);
+                normal_matrix(m) * v
+            }
+            NormalSpace::Tangent => {
+                let Some(set) = self.textures.uv_set(&map.uv, p.at.mesh) else { return p.ns };
+                let tangent = p.tangent(&self.scene, set);
+                if tangent == Vec3::ZERO {
+                    return p.ns;
+                }
+                let f = Frame::from_normal_tangent(p.ns, tangent);
+                let bitangent = if p.uv_is_mirrored(&self.scene, set) { -f.t } else { f.t };
+                f.s * v.x + bitangent * v.y + f.n * v.z
+            }
+        };
+        let n = normalize_any(n);
+        let strength = self.textures.number(&map.strength, &p.at).max(0.0);
+        let n = normalize_any(p.ns + (n - p.ns) * strength);
+        if n == Vec3::ZERO { p.ns } else { n }
+    }
+
+    /// Texture coordinates of a point in the mesh's first UV set; zero without one.
+    pub fn uv(&self, at: &MeshPoint) -> glam::Vec2 {
+        let mesh = &self.scene.meshes[at.mesh as usize];
+        mesh.uvs.first().map_or(glam::Vec2::ZERO, |(_, a)| super::texture::interpolate(a, mesh, at))
+    }
+}
+
+/// Keeps a refractive index from a texture within what exists.
+fn sane_ior(ior: f32) -> f32 {
+    if ior.is_finite() { ior.clamp(1e-2, 1e2) } else { 1.5 }
+}
+
+fn rotated(f: Frame, turns: f32) -> Frame {
+    let (sin, cos) = (TAU * turns).sin_cos();
+    Frame { s: f.s * cos + f.t * sin, t: f.t * cos - f.s * sin, n: f.n }
+}

@@ -1,0 +1,135 @@
+//! What a ray finds where it hits: position, normals, tangents.
+
+use super::bsdf::Bsdf;
+use super::emitters::Receiver;
+use super::texture::{MeshPoint, interpolate};
+use crate::accel::offset::SurfacePoint as Place;
+use crate::accel::{Accel, Hit};
+use crate::scene::{Mesh, Scene};
+use glam::{Mat3, Vec2, Vec3};
+
+/// A point on a surface, in scene space.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Position, with its rounding error and the geometric normal: out of the front side, where corners
+    /// wind counter-clockwise in object space.
+    pub place: Place,
+    /// Unit shading normal, in the hemisphere of the geometric one.
+    pub ns: Vec3,
+    /// Instance that was hit.
+    pub instance: u32,
+    /// Material there.
+    pub material: u32,
+    /// Where that is on the mesh.
+    pub at: MeshPoint,
+}
+
+/// A point of a mesh in the world, as the ray tracer sees it.
+pub fn place(scene: &Scene, accel: &Accel, instance: u32, at: &MeshPoint) -> Place {
+    let mesh = &scene.meshes[at.mesh as usize];
+    let corners = mesh.triangles[at.triangle as usize].map(|i| mesh.positions[i as usize]);
+    let to_world = &scene.instances[instance as usize].to_world;
+    accel.surface_point(instance, corners, to_world, at.barycentrics.to_array())
+}
+
+/// Object-to-world map of normals, up to a positive factor: the cofactor matrix, turned so that a
+/// mirrored instance keeps its outside.
+pub fn normal_matrix(m: Mat3) -> Mat3 {
+    let [a, b, c] = [m.x_axis, m.y_axis, m.z_axis];
+    let cofactors = Mat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
+    if m.determinant() < 0.0 { -cofactors } else { cofactors }
+}
+
+/// Normalises without under- or overflow, whatever the scale.
+pub fn normalize_any(v: Vec3) -> Vec3 {
+    let scale = v.abs().max_element();
+    if scale > 0.0 && scale.is_finite() { (v / scale).normalize() } else { Vec3::ZERO }
+}
+
+impl SurfacePoint {
+    /// The surface where a ray hit.
+    pub fn new(scene: &Scene, accel: &Accel, hit: &Hit) -> Self {
+        let group = scene.group(hit.instance);
+        let mesh = &*scene.meshes[group.mesh as usize];
+        let at =
+            MeshPoint { mesh: group.mesh, triangle: hit.triangle, barycentrics: Vec2::new(hit.u, hit.v) };
+        let place = place(scene, accel, hit.instance, &at);
+        let ns = match &mesh.normals {
+            None => place.normal,
+            Some(n) => {
+                let matrix = Mat3::from(scene.instances[hit.instance as usize].to_world.matrix3);
+                let n = normalize_any(normal_matrix(matrix) * interpolate(n, mesh, &at));
+                // no normal there (zero, not finite): the geometric one
+                if n.length_squared() > 0.5 { n * 1f32.copysign(n.dot(place.normal)) } else { place.normal }
+            }
+        };
+        Self {
+            place,
+            ns,
+            instance: hit.instance,
+            material: scene.material_index(hit.instance, hit.triangle),
+            at,
+        }
+    }
+
+    /// This point as one that light is sampled for: from all sides where its `bsdf` transmits, else from
+    /// the side of `wo` alone.
+    pub fn receiver(&self, bsdf: &Bsdf, wo: Vec3) -> Receiver {
+        let facing = if self.place.normal.dot(wo) < 0.0 { -self.place.normal } else { self.place.normal };
+        Receiver { position: self.place.position, normal: (!bsdf.transmits()).then_some(facing) }
+    }
+
+    /// The world-space derivative of the position by u of a UV set, or zero where it has none.
+    pub fn tangent(&self, scene: &Scene, uv_set: usize) -> Vec3 {
+        let mesh: &Mesh = &scene.meshes[self.at.mesh as usize];
+        let vertices = mesh.triangles[self.at.triangle as usize];
+        let Ok([ua, ub, uc]) = mesh.uvs[uv_set].1.corners(self.at.triangle as usize, vertices) else {
+            return Vec3::ZERO;
+        };
+        let [a, b, c] = vertices.map(|i| mesh.positions[i as usize]);
+        let (d1, d2) = (ub - ua, uc - ua);
+        let det = d1.perp_dot(d2);
+        let t = ((b - a) * d2.y - (c - a) * d1.y) * 1f32.copysign(det);
+        let matrix = Mat3::from(scene.instances[self.instance as usize].to_world.matrix3);
+        if det != 0.0 { normalize_any(matrix * normalize_any(t)) } else { Vec3::ZERO }
+    }
+
+    /// Whether the UV set winds against the triangle, so that its bitangent is turned over.
+    pub fn uv_is_mirrored(&self, scene: &Scene, uv_set: usize) -> bool {
+        let mesh: &Mesh = &scene.meshes[self.at.mesh as usize];
+        let vertices = mesh.triangles[self.at.triangle as usize];
+        let mirrored = match mesh.uvs[uv_set].1.corners(self.at.triangle as usize, vertices) {
+            Ok([a, b, c]) => (b - a).perp_dot(c - a) < 0.0,
+            Err(_) => false,
+        };
+        mirrored != (Mat3::from(scene.instances[self.instance as usize].to_world.matrix3).determinant() < 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_stay_normal_under_shear_and_mirror() {
+        let m =
+            Mat3::from_cols(Vec3::new(2.0, 0.1, 0.0), Vec3::new(1.0, -3.0, 0.5), Vec3::new(0.0, 0.3, 0.7));
+        for m in [m, -m] {
+            let (e1, e2) = (Vec3::new(1.0, 0.2, 0.0), Vec3::new(-0.3, 1.0, 0.4));
+            let n = normal_matrix(m) * e1.cross(e2);
+            assert!(n.dot(m * e1).abs() < 1e-4 && n.dot(m * e2).abs() < 1e-4);
+            // what was outside stays outside
+            let out = e1.cross(e2);
+            assert!(n.dot(m * out) > 0.0);
+        }
+    }
+
+    #[test]
+    fn tiny_and_huge_vectors_normalise() {
+        for s in [1e-30, 1e30] {
+            assert!((normalize_any(Vec3::new(3.0, 0.0, 4.0) * s) - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-6);
+        }
+        assert_eq!(normalize_any(Vec3::ZERO), Vec3::ZERO);
+        assert_eq!(normalize_any(Vec3::NAN), Vec3::ZERO);
+    }
+}

@@ -1,0 +1,243 @@
+//! Texture lookup at a surface point.
+
+use crate::math::luminance;
+use crate::scene::material::{Channel, Value};
+use crate::scene::mesh::Attribute;
+use crate::scene::texture::{ImageTexture, Reconstruction, Texture, Wrap};
+use crate::scene::{Image, Mesh, Scene};
+use glam::{Vec2, Vec3, Vec4};
+use std::ops::{Add, Mul};
+use std::sync::Arc;
+
+/// Where on a mesh a texture is looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshPoint {
+    /// Index of the mesh.
+    pub mesh: u32,
+    /// Triangle of the mesh.
+    pub triangle: u32,
+    /// Barycentrics of the triangle's second and third vertex.
+    pub barycentrics: Vec2,
+}
+
+/// All textures of a scene, with the names of attributes resolved to numbers.
+#[derive(Debug)]
+pub struct TextureSet {
+    scene: Arc<Scene>,
+    /// For each texture, the number of its attribute's name.
+    texture_names: Vec<u32>,
+    /// For each mesh, name numbers of its UV sets and of its colours.
+    uv_names: Vec<Box<[u32]>>,
+    color_names: Vec<Box<[u32]>>,
+}
+
+/// Name number that means "the first set".
+const FIRST: u32 = u32::MAX;
+
+impl TextureSet {
+    /// Resolves the names of a scene's textures.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let names: Vec<&str> = scene
+            .textures
+            .iter()
+            .filter_map(|t| match t {
+                Texture::Constant(_) => None,
+                Texture::Image(t) => Some(t.uv.as_str()),
+                Texture::Attribute { name, .. } => Some(name.as_str()),
+            })
+            .collect();
+        let number = |name: &str| match name {
+            "" => FIRST,
+            // a name that no texture asks for gets a number past the end
+            _ => names.iter().position(|n| *n == name).unwrap_or(names.len()) as u32,
+        };
+        let texture_names = scene
+            .textures
+            .iter()
+            .map(|t| match t {
+                Texture::Constant(_) => FIRST,
+                Texture::Image(t) => number(&t.uv),
+                Texture::Attribute { name, .. } => number(name),
+            })
+            .collect();
+        let uv_names = scene.meshes.iter().map(|m| m.uvs.iter().map(|(n, _)| number(n)).collect()).collect();
+        let color_names =
+            scene.meshes.iter().map(|m| m.colors.iter().map(|(n, _)| number(n)).collect()).collect();
+        Self { texture_names, uv_names, color_names, scene }
+    }
+
+    /// The RGBA value of a texture. An image on a mesh without the UV set reads it at (0,0).
+    pub fn lookup(&self, texture: u32, at: &MeshPoint) -> Vec4 {
+        match &self.scene.textures[texture as usize] {
+            Texture::Constant(v) => *v,
+            Texture::Image(t) => {
+                let uv = self.uv(texture, at).unwrap_or(Vec2::ZERO);
+                let image = &self.scene.images[t.image as usize];
+                sample(image, t, t.transform.transform_point2(uv)) * t.scale + t.bias
+            }
+            Texture::Attribute { default, .. } => {
+                let colors = &self.scene.meshes[at.mesh as usize].colors;
+                match index(&self.color_names[at.mesh as usize], self.texture_names[texture as usize]) {
+                    Some(i) => interpolate(&colors[i].1, &self.scene.meshes[at.mesh as usize], at),
+                    None => *default,
+                }
+            }
+        }
+    }
+
+    /// A parameter as a colour.
+    #[inline]
+    pub fn color(&self, value: &Value, at: &MeshPoint) -> Vec3 {
+        match *value {
+            Value::Constant(c) => c,
+            Value::Texture { texture, channel } => {
+                let v = self.lookup(texture, at);
+                match channel {
+                    Channel::Rgb => v.truncate(),
+                    Channel::R => Vec3::splat(v.x),
+                    Channel::G => Vec3::splat(v.y),
+                    Channel::B => Vec3::splat(v.z),
+                    Channel::A => Vec3::splat(v.w),
+                    Channel::Luminance => Vec3::splat(luminance(v.truncate())),
+                    Channel::Average => Vec3::splat(v.truncate().element_sum() / 3.0),
+                }
+            }
+        }
+    }
+
+    /// A parameter as a number; a colour counts by its luminance.
+    #[inline]
+    pub fn number(&self, value: &Value, at: &MeshPoint) -> f32 {
+        let c = self.color(value, at);
+        if c.x == c.y && c.y == c.z { c.x } else { luminance(c) }
+    }
+
+    /// Index in the mesh's list of the UV set that `name` (of a normal map) means.
+    pub fn uv_set(&self, name: &str, mesh: u32) -> Option<usize> {
+        self.scene.meshes[mesh as usize].uv_index(name)
+    }
+
+    fn uv(&self, texture: u32, at: &MeshPoint) -> Option<Vec2> {
+        let mesh = &self.scene.meshes[at.mesh as usize];
+        let i = index(&self.uv_names[at.mesh as usize], self.texture_names[texture as usize])?;
+        Some(interpolate(&mesh.uvs[i].1, mesh, at))
+    }
+}
+
+fn index(names: &[u32], name: u32) -> Option<usize> {
+    match name {
+        FIRST => (!names.is_empty()).then_some(0),
+        _ => names.iter().position(|&n| n == name),
+    }
+}
+
+/// The attribute at a point of a triangle.
+#[inline]
+pub fn interpolate<T>(attribute: &Attribute<T>, mesh: &Mesh, at: &MeshPoint) -> T
+where
+    T: Copy + Add<Output = T> + Mul<f32, Output = T>,
+{
+    match attribute.corners(at.triangle as usize, mesh.triangles[at.triangle as usize]) {
+        Err(v) => v,
+        Ok([a, b, c]) => {
+            let Vec2 { x: u, y: v } = at.barycentrics;
+            a * (1.0 - u - v) + b * u + c * v
+        }
+    }
+}
+
+/// Texel index of a coordinate, `None` for black.
+fn wrap(i: i64, size: i64, mode: Wrap) -> Option<u32> {
+    let k = match mode {
+        Wrap::Repeat => i.rem_euclid(size),
+        Wrap::Clamp => i.clamp(0, size - 1),
+        Wrap::Mirror => {
+            let k = i.rem_euclid(2 * size);
+            k.min(2 * size - 1 - k)
+        }
+        Wrap::Black if (0..size).contains(&i) => i,
+        Wrap::Black => return None,
+    };
+    Some(k as u32)
+}
+
+fn sample(image: &Image, t: &ImageTexture, st: Vec2) -> Vec4 {
+    if !st.is_finite() {
+        return Vec4::ZERO;
+    }
+    let (w, h) = (image.width() as i64, image.height() as i64);
+    let texel = |x: i64, y: i64| match (wrap(x, w, t.wrap[0]), wrap(y, h, t.wrap[1])) {
+        (Some(x), Some(y)) => image.texel(x, y),
+        _ => Vec4::ZERO,
+    };
+    // row 0 is the top row, and t grows upwards; far coordinates saturate, which no picture can show
+    let p = Vec2::new(st.x * w as f32, (1.0 - st.y) * h as f32).clamp(Vec2::splat(-1e12), Vec2::splat(1e12));
+    match t.filter {
+        Reconstruction::Closest => texel(p.x.floor() as i64, p.y.floor() as i64),
+        Reconstruction::Linear => {
+            let q = p - 0.5;
+            let corner = q.floor();
+            let f = q - corner;
+            let (x, y) = (corner.x as i64, corner.y as i64);
+            let top = texel(x, y).lerp(texel(x + 1, y), f.x);
+            let bottom = texel(x, y + 1).lerp(texel(x + 1, y + 1), f.x);
+            top.lerp(bottom, f.y)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Warnings;
+    use crate::scene::image::{Encoding, Pixels};
+    use glam::Affine2;
+
+    fn checker() -> Image {
+        // row 0 (top): 1 2, row 1 (bottom): 3 4
+        let p = Pixels::F32(vec![1.0, 2.0, 3.0, 4.0]);
+        Image::new("c", (2, 2, 1), p, Encoding::Linear, &mut Warnings::default()).unwrap()
+    }
+
+    fn texture(filter: Reconstruction, mode: Wrap) -> ImageTexture {
+        ImageTexture {
+            image: 0,
+            uv: String::new(),
+            transform: Affine2::IDENTITY,
+            wrap: [mode; 2],
+            filter,
+            scale: Vec4::ONE,
+            bias: Vec4::ZERO,
+        }
+    }
+
+    #[test]
+    fn the_origin_is_at_the_bottom_left() {
+        let t = texture(Reconstruction::Closest, Wrap::Clamp);
+        let at = |s, v| sample(&checker(), &t, Vec2::new(s, v)).x;
+        assert_eq!([at(0.1, 0.1), at(0.9, 0.1), at(0.1, 0.9), at(0.9, 0.9)], [3.0, 4.0, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn wrap_modes() {
+        let value =
+            |mode, s: f32| sample(&checker(), &texture(Reconstruction::Closest, mode), Vec2::new(s, 0.1)).x;
+        let row = |mode| [-0.9, -0.1, 0.1, 0.9, 1.1, 1.9, 2.1].map(|s| value(mode, s));
+        assert_eq!(row(Wrap::Repeat), [3.0, 4.0, 3.0, 4.0, 3.0, 4.0, 3.0]);
+        assert_eq!(row(Wrap::Clamp), [3.0, 3.0, 3.0, 4.0, 4.0, 4.0, 4.0]);
+        assert_eq!(row(Wrap::Mirror), [4.0, 3.0, 3.0, 4.0, 4.0, 3.0, 3.0]);
+        assert_eq!(row(Wrap::Black), [0.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn bilinear_filtering_is_exact_at_centres_and_linear_between() {
+        let t = texture(Reconstruction::Linear, Wrap::Repeat);
+        let at = |s, v| sample(&checker(), &t, Vec2::new(s, v)).x;
+        assert_eq!(at(0.25, 0.25), 3.0);
+        assert_eq!(at(0.5, 0.25), 3.5);
+        assert_eq!(at(0.5, 0.5), 2.5);
+        assert_eq!(at(0.0, 0.25), 3.5, "repeats across the edge");
+        assert_eq!(at(f32::NAN, 0.0), 0.0);
+        assert!(at(1e30, -1e30).is_finite());
+    }
+}

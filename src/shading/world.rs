@@ -1,0 +1,482 @@
+//! The scene made ready: what integrators ask of it. Rays through holes and transparent surfaces, lights
+//! met and lights sampled, surfaces shaded.
+
+use super::bsdf::Bsdf;
+use super::emitters::{EmitterHit, Emitters, Incident, MeshTriangle, Receiver, SceneBounds};
+use super::material::Materials;
+use super::surface::{SurfacePoint, place};
+use super::texture::MeshPoint;
+use crate::accel::offset::SurfacePoint as Place;
+use crate::accel::{Accel, AccelError, InstanceGeometry, MeshGeometry, Ray};
+use crate::scene::needs::may_emit;
+use crate::scene::{Needs, Scene, SceneError, Warnings};
+use crate::shading::CameraRay;
+use glam::{DVec3, Vec2, Vec2Swizzles, Vec3};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Why a scene could not be made ready.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum WorldError {
+    #[error(transparent)]
+    Accel(#[from] AccelError),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+}
+
+/// What building a part took.
+#[derive(Clone, Copy, Debug)]
+pub struct BuildCost {
+    /// Which part.
+    pub name: &'static str,
+    /// Seconds on the wall clock.
+    pub seconds: f64,
+    /// Bytes it keeps.
+    pub bytes: u64,
+}
+
+/// A scene, ready to be traced and shaded. Positions are relative to [`Scene::origin`].
+pub struct World {
+    scene: Arc<Scene>,
+    accel: Accel,
+    materials: Materials,
+    emitters: Emitters,
+    needs: Needs,
+    warnings: Warnings,
+    costs: Vec<BuildCost>,
+}
+
+/// A stretch of a ray between two surfaces. A ray that passes through transparent surfaces is a chain of
+/// pieces; light that it meets is weighed as seen from where the first one began.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    ray: Ray,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Distance from where the ray began to where this piece does.
+    travelled: f32,
+}
+
+/// Light met along a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct LightPoint {
+    /// Radiance against the ray.
+    pub radiance: Vec3,
+    /// Unit direction of the ray.
+    direction: Vec3,
+    /// Where it was met, with the distance from the ray's very beginning.
+    hit: EmitterHit,
+}
+
+/// Light sampled from a surface point.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Unit direction to the light.
+    pub direction: Vec3,
+    /// Radiance; of a delta light, the irradiance of a surface that faces it.
+    pub radiance: Vec3,
+    /// Density per solid angle; of a delta light, the probability of having chosen it.
+    pub pdf: f32,
+    /// Whether nothing else could have found this direction.
+    pub is_delta: bool,
+    target: Target,
+}
+
+/// Where sampled light comes from.
+#[derive(Clone, Copy, Debug)]
+enum Target {
+    /// Far away, along the sample's direction.
+    Infinity,
+    /// A point in space.
+    Point(Vec3),
+    /// A point of a surface that is part of the scene.
+    Surface(Place),
+}
+
+/// A surface point, shaded.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex {
+    /// How it scatters. Without transparency, which is visibility's.
+    pub bsdf: Bsdf,
+    /// Radiance that it emits towards where it is seen from.
+    pub emission: Vec3,
+}
+
+/// What a ray does at a surface.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant)] // the large one is the usual one
+pub enum Shaded {
+    /// It passes straight through.
+    Through {
+        /// Factor on its throughput.
+        weight: Vec3,
+    },
+    /// It is scattered or absorbed.
+    Scatters {
+        /// Factor on its throughput.
+        weight: Vec3,
+        /// The surface.
+        vertex: Vertex,
+    },
+}
+
+impl LightSample {
+    /// The ray that must be free for the light to arrive.
+    fn ray_from(&self, p: &Place) -> Ray {
+        match &self.target {
+            Target::Infinity => p.spawn(self.direction),
+            Target::Point(target) => p.segment_to_point(*target),
+            Target::Surface(target) => p.segment_to(target),
+        }
+    }
+}
+
+impl Piece {
+    /// The first piece of a camera ray.
+    pub fn from_camera(c: &CameraRay) -> Self {
+        let ray = Ray { origin: c.origin, direction: c.direction, t_min: c.range[0], t_max: c.range[1] };
+        Self { ray, direction: c.direction, travelled: 0.0 }
+    }
+
+    /// The first piece of a ray that leaves a surface.
+    pub fn leaving(p: &SurfacePoint, direction: Vec3) -> Self {
+        Self { ray: p.place.spawn(direction), direction, travelled: 0.0 }
+    }
+
+    /// The next piece, beyond a surface that was passed.
+    pub fn beyond(&self, p: &SurfacePoint) -> Self {
+        let ray = p.place.spawn(self.direction);
+        let step = (ray.origin - self.ray.origin).length();
+        let ray = Ray { t_max: self.ray.t_max - step, ..ray };
+        Self { ray, direction: self.direction, travelled: self.travelled + step }
+    }
+}
+
+/// Emissive triangles beyond this number are found by hitting them only: choosing among so many costs
+/// more memory than it is worth.
+const MOST_SAMPLED_TRIANGLES: usize = 1 << 23;
+/// Points of a triangle at which its mean radiance is taken.
+const EMISSION_POINTS: [Vec2; 7] = [
+    Vec2::new(1.0 / 3.0, 1.0 / 3.0),
+    Vec2::new(0.1, 0.1),
+    Vec2::new(0.8, 0.1),
+    Vec2::new(0.1, 0.8),
+    Vec2::new(0.45, 0.45),
+    Vec2::new(0.1, 0.45),
+    Vec2::new(0.45, 0.1),
+];
+
+impl World {
+    /// Builds the ray tracing structure and the emitters, on the current rayon pool. `keep_all`: leave
+    /// out nothing that this scene does not need.
+    pub fn new(scene: Arc<Scene>, keep_all: bool) -> Result<Self, WorldError> {
+        let needs = if keep_all { Needs::ALL } else { Needs::of(&scene) };
+        let mut warnings = scene.warnings.clone();
+        let mut costs = Vec::new();
+
+        let start = Instant::now();
+        let meshes: Vec<MeshGeometry> = scene
+            .meshes
+            .iter()
+            .map(|m| MeshGeometry { positions: &m.positions, triangles: &m.triangles })
+            .collect();
+        let instances: Vec<InstanceGeometry> = scene
+            .instances
+            .iter()
+            .map(|i| InstanceGeometry { mesh: scene.groups[i.group as usize].mesh, to_world: i.to_world })
+            .collect();
+        let accel = Accel::build(&meshes, &instances)?;
+        drop(instances);
+        let dropped = accel.dropped();
+        for (what, n) in [
+            (
+                "triangles too far away or too large for single precision dropped",
+                dropped.non_finite_triangles,
+            ),
+            ("triangles without area in single precision dropped", dropped.degenerate_triangles),
+            ("instances with a singular transform dropped", dropped.singular_instances),
+        ] {
+            if n > 0 {
+                warnings.add("scene", what, n as u64);
+            }
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        costs.push(BuildCost { name: "acceleration structure", seconds, bytes: accel.memory_bytes() as u64 });
+
+        let start = Instant::now();
+        let materials = Materials::new(scene.clone());
+        let triangles = emissive_triangles(&scene, &materials, &mut warnings);
+        let (low, high) = accel.bounds();
+        let bounds = SceneBounds {
+            center: (low + high) * 0.5,
+            // an empty scene still has a sky
+            radius: Some(0.5 * (high - low).length()).filter(|&r| r > 0.0).unwrap_or(1.0),
+        };
+        let emitters = Emitters::build(&scene.lights, &triangles, &scene.images, bounds, &mut warnings)?;
+        let bytes = (triangles.len() * size_of::<MeshTriangle>()) as u64;
+        costs.push(BuildCost { name: "lights", seconds: start.elapsed().as_secs_f64(), bytes });
+        if emitters.is_empty() {
+            warnings.add("scene", "nothing emits light: the picture will be black", 1);
+        }
+        Ok(Self { scene, accel, materials, emitters, needs, warnings, costs })
+    }
+
+    /// The scene's data.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// What the scene needs.
+    #[inline]
+    pub fn needs(&self) -> &Needs {
+        &self.needs
+    }
+
+    /// What was repaired or left out, the scene's own warnings included.
+    pub fn warnings(&self) -> &Warnings {
+        &self.warnings
+    }
+
+    /// What building took.
+    pub fn costs(&self) -> &[BuildCost] {
+        &self.costs
+    }
+
+    /// A scene position in world coordinates.
+    pub fn absolute(&self, p: Vec3) -> Vec3 {
+        (p.as_dvec3() + self.scene.origin).as_vec3()
+    }
+
+    /// A world position in scene coordinates.
+    pub fn relative(&self, p: DVec3) -> Vec3 {
+        (p - self.scene.origin).as_vec3()
+    }
+
+    /// Texture coordinates of a surface point.
+    pub fn uv(&self, p: &SurfacePoint) -> Vec2 {
+        self.materials.uv(&p.at)
+    }
+
+    /// The surface at the end of a piece.
+    #[inline]
+    pub fn closest(&self, piece: &Piece, from_camera: bool) -> Option<SurfacePoint> {
+        let hit = match from_camera && self.needs.camera_visibility {
+            false => self.accel.closest(&piece.ray),
+            true => self.accel.closest_where(&piece.ray, &|h| self.scene.group(h.instance).camera_visible),
+        }?;
+        Some(SurfacePoint::new(&self.scene, &self.accel, &hit))
+    }
+
+    /// What happens to a ray at a surface that is seen along `wo`. `choice`: a uniform number that
+    /// decides between passing and scattering where both are possible.
+    pub fn shade(&self, p: &SurfacePoint, wo: Vec3, choice: f32) -> Shaded {
+        if !self.needs.transparency || !self.materials.may_be_transparent(p.material) {
+            let emission = self.emission_towards(p, wo);
+            return Shaded::Scatters {
+                weight: Vec3::ONE,
+                vertex: Vertex { bsdf: self.materials.bsdf(p), emission },
+            };
+        }
+        let through = self.materials.transparency(p.material, &p.at);
+        let emission = self.emission_towards(p, wo);
+        // what emits must be met now and then, however transparent it is
+        let most = if emission == Vec3::ZERO { 1.0 } else { 0.5 };
+        let pass = through.max_element().min(most);
+        if choice < pass {
+            return Shaded::Through { weight: through / pass };
+        }
+        let weight = Vec3::splat(self.materials.opacity(p.material, &p.at) / (1.0 - pass));
+        Shaded::Scatters { weight, vertex: Vertex { bsdf: self.materials.bsdf(p), emission } }
+    }
+
+    fn emission_towards(&self, p: &SurfacePoint, wo: Vec3) -> Vec3 {
+        if !self.needs.emissive_surfaces {
+            return Vec3::ZERO;
+        }
+        match self.scene.group(p.instance).two_sided_emission || p.place.normal.dot(wo) > 0.0 {
+            true => self.materials.emission(p.material, &p.at),
+            false => Vec3::ZERO,
+        }
+    }
+
+    /// Calls `found` for every analytic light on a piece, up to the surface at its end.
+    #[inline]
+    pub fn for_each_light_on(
+        &self,
+        piece: &Piece,
+        end: Option<&SurfacePoint>,
+        from_camera: bool,
+        mut found: impl FnMut(LightPoint),
+    ) {
+        if !self.needs.light_shapes {
+            return;
+        }
+        let Piece { ray, direction, travelled } = *piece;
+        let t_max = end.map_or(ray.t_max, |p| (p.place.position - ray.origin).dot(direction));
+        self.emitters.for_each_hit(ray.origin, direction, t_max, |hit| {
+            if hit.distance >= ray.t_min && (!from_camera || self.emitters.camera_visible(hit.emitter)) {
+                let hit = EmitterHit { distance: travelled + hit.distance, ..hit };
+                found(LightPoint { radiance: hit.radiance, direction, hit });
+            }
+        });
+    }
+
+    /// Calls `found` for every light at infinity that is seen along the end of a piece.
+    #[inline]
+    pub fn for_each_infinite_light(
+        &self,
+        piece: &Piece,
+        from_camera: bool,
+        mut found: impl FnMut(LightPoint),
+    ) {
+        // a ray that the camera's far plane ends does not see what is behind
+        if !self.needs.infinite_lights || piece.ray.t_max < f32::INFINITY {
+            return;
+        }
+        let direction = piece.direction;
+        self.emitters.for_each_infinite(direction, |hit| {
+            if !from_camera || self.emitters.camera_visible(hit.emitter) {
+                found(LightPoint { radiance: hit.radiance, direction, hit });
+            }
+        });
+    }
+
+    /// The surface at the end of a piece as a light, if it is one that can be sampled.
+    pub fn emitter_at(&self, piece: &Piece, p: &SurfacePoint, radiance: Vec3) -> Option<LightPoint> {
+        let emitter = self.emitters.triangle(p.instance, p.at.triangle)?;
+        let distance = piece.travelled + (p.place.position - piece.ray.origin).length();
+        let Place { position: point, normal, .. } = p.place;
+        let hit = EmitterHit { emitter, distance, point, normal, radiance };
+        Some(LightPoint { radiance, direction: piece.direction, hit })
+    }
+
+    /// A sample of the light that reaches a receiver, nothing being in the way.
+    pub fn sample_light(&self, receiver: &Receiver, u: Vec3) -> Option<LightSample> {
+        let (id, chosen, fresh) = self.emitters.select(receiver, u.x)?;
+        let s = self.emitters.sample_towards(id, receiver, Vec2::new(fresh, u.y))?;
+        let target = if s.distance.is_finite() { Target::Point(s.point) } else { Target::Infinity };
+        Some(match s.incident {
+            Incident::Delta { irradiance } => LightSample {
+                direction: s.direction,
+                radiance: irradiance,
+                pdf: chosen.0,
+                is_delta: true,
+                target,
+            },
+            Incident::Radiance { radiance, pdf } => {
+                let (radiance, target) =
+                    match s.barycentrics.and_then(|b| Some((b, self.emitters.triangle_of(id)?))) {
+                        None => (radiance, target),
+                        Some((b, (instance, triangle))) => {
+                            let mesh = self.scene.group(instance).mesh;
+                            let barycentrics = if self.scene.is_mirrored(instance) { b.yx() } else { b };
+                            let at = MeshPoint { mesh, triangle, barycentrics };
+                            let target = Target::Surface(place(&self.scene, &self.accel, instance, &at));
+                            (self.visible_emission(instance, &at), target)
+                        }
+                    };
+                LightSample {
+                    direction: s.direction,
+                    radiance,
+                    pdf: chosen.0 * pdf.0,
+                    is_delta: false,
+                    target,
+                }
+            }
+        })
+    }
+
+    /// Density per solid angle with which [`World::sample_light`] finds light that a ray from the
+    /// receiver met.
+    pub fn pdf_of_sampling(&self, receiver: &Receiver, light: &LightPoint) -> f32 {
+        let chosen = self.emitters.probability(receiver, light.hit.emitter);
+        chosen.0 * self.emitters.pdf_towards(receiver, light.direction, &light.hit).0
+    }
+
+    /// Emission of a triangle, as much of it as there is.
+    fn visible_emission(&self, instance: u32, at: &MeshPoint) -> Vec3 {
+        let material = self.scene.material_index(instance, at.triangle);
+        let emission = self.materials.emission(material, at);
+        match self.needs.transparency && self.materials.may_be_transparent(material) {
+            true => emission * self.materials.opacity(material, at),
+            false => emission,
+        }
+    }
+
+    /// Share of light that comes through from a sampled light to a surface point. Adds the rays it takes
+    /// to `rays`.
+    pub fn transmittance(&self, from: &SurfacePoint, light: &LightSample, rays: &mut u64) -> Vec3 {
+        let mut ray = light.ray_from(&from.place);
+        *rays += 1;
+        if !self.needs.transparency {
+            return if self.accel.occluded(&ray) { Vec3::ZERO } else { Vec3::ONE };
+        }
+        let opaque = |instance, triangle| {
+            !self.materials.may_be_transparent(self.scene.material_index(instance, triangle))
+        };
+        // most shadow rays that are blocked are blocked by something opaque
+        if self.accel.occluded_where(&ray, &|h| opaque(h.instance, h.triangle)) {
+            return Vec3::ZERO;
+        }
+        let mut weight = Vec3::ONE;
+        while let Some(hit) = self.accel.closest(&ray) {
+            let p = SurfacePoint::new(&self.scene, &self.accel, &hit);
+            weight *= self.materials.transparency(p.material, &p.at);
+            if weight == Vec3::ZERO {
+                return weight;
+            }
+            *rays += 1;
+            ray = light.ray_from(&p.place);
+        }
+        weight
+    }
+}
+
+/// The triangles that emit, with their mean radiance.
+fn emissive_triangles(scene: &Scene, materials: &Materials, warnings: &mut Warnings) -> Vec<MeshTriangle> {
+    let emits: Vec<bool> = scene
+        .materials
+        .iter()
+        .map(|m| {
+            let mut found = false;
+            m.surface.for_each(&mut |c| found |= may_emit(c));
+            found
+        })
+        .collect();
+    let mut triangles = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let group = &scene.groups[instance.group as usize];
+        if !group.materials.iter().any(|&m| emits[m as usize]) {
+            continue;
+        }
+        let mesh = &scene.meshes[group.mesh as usize];
+        if triangles.len() + mesh.triangles.len() > MOST_SAMPLED_TRIANGLES {
+            let what = "too many emissive triangles: the rest of them is not sampled, only hit";
+            warnings.add(format!("instances {:?}", group.name), what, 1);
+            break;
+        }
+        for t in 0..mesh.triangles.len() as u32 {
+            let material = scene.material_index(i as u32, t);
+            if !emits[material as usize] {
+                continue;
+            }
+            let at = |barycentrics| MeshPoint { mesh: group.mesh, triangle: t, barycentrics };
+            let sum: Vec3 = EMISSION_POINTS
+                .into_iter()
+                .map(|b| materials.emission(material, &at(b)) * materials.opacity(material, &at(b)))
+                .sum();
+            let corners = mesh.triangles[t as usize].map(|v| mesh.positions[v as usize]);
+            let [a, b, c] = corners.map(|p| instance.to_world.transform_point3(p));
+            let vertices = if scene.is_mirrored(i as u32) { [a, c, b] } else { [a, b, c] };
+            triangles.push(MeshTriangle {
+                instance: i as u32,
+                triangle: t,
+                vertices,
+                radiance: sum / EMISSION_POINTS.len() as f32,
+                two_sided: group.two_sided_emission,
+            });
+        }
+    }
+    triangles
+}
