@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import json
-from collections.abc import Callable, Mapping
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from os import PathLike, fspath
 from typing import Any
 
@@ -18,6 +21,24 @@ from .scene import Scene
 
 Progress = Callable[[dict], Any]
 Tile = Callable[[int, int, int, int], Any]
+
+
+@contextmanager
+def _interrupt_collected(raised: list[BaseException]) -> Iterator[None]:
+    """Has Ctrl-C add a KeyboardInterrupt to the list instead of raising it.
+
+    Raised at the entry of a ctypes callback, before its first line, it would be lost. A handler
+    that somebody else installed is left alone.
+    """
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: raised.append(KeyboardInterrupt()))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class Render:
@@ -61,7 +82,7 @@ class Render:
         raised: list[BaseException] = []
 
         # Both callbacks are always given to the engine: entering the interpreter is what lets
-        # Python deliver a pending signal (Ctrl-C) on the main thread.
+        # Python run the handler of a pending signal (Ctrl-C) on the main thread.
         def on_progress(_user: int | None, report: bytes) -> int:
             try:
                 if raised:
@@ -84,7 +105,8 @@ class Render:
             tile=_abi.TILE_FN(on_tile),
             user=None,
         )
-        status = self._library.segue_render_run(self._handle, ctypes.byref(callbacks))
+        with _interrupt_collected(raised):
+            status = self._library.segue_render_run(self._handle, ctypes.byref(callbacks))
         if raised:
             raise raised[0]
         if status == CancelledError.status:

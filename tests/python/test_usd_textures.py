@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("pxr")
 pytest.importorskip("OpenImageIO")
 
-import OpenImageIO as oiio
+import OpenImageIO as oiio  # noqa: N813
 from pxr import Sdf, Usd
 
 from segue import usd
