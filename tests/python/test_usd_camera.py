@@ -33,7 +33,8 @@ def test_window_and_default_size():
     assert found["type"] == "perspective"
     assert found["window"] == pytest.approx([-0.4, 0.4, -0.2, 0.2])
     assert imported.resolution == (1280, 640)
-    assert (found["near"], found["far"]) == (1, 1000000)
+    assert found["near"] == 1
+    assert "far" not in found
     assert "aperture_radius" not in found
 
 
@@ -66,6 +67,8 @@ def test_orthographic():
 
 
 def test_clipping_range():
+    found, _ = camera(LENS + "float2 clippingRange = (0.25, 40)")
+    assert (found["near"], found["far"]) == (0.25, 40)
     found, _ = camera(LENS + "float2 clippingRange = (0.5, inf)")
     assert found["near"] == 0.5
     assert "far" not in found

@@ -193,9 +193,11 @@ def read_camera(
         "transform": flat(rigid),
         "window": list(window),
     }
-    near, far = (float(v) for v in get(camera.GetClippingRangeAttr()))
+    clipping = camera.GetClippingRangeAttr()
+    near, far = (float(v) for v in get(clipping))
     description["near"] = max(near, 0.0)
-    if math.isfinite(far) and far > near:
+    # The schema's fallback for the far plane only says that nothing was said.
+    if clipping.HasAuthoredValue() and math.isfinite(far) and far > near:
         description["far"] = far
     stop, distance = (
         float(get(camera.GetFStopAttr())),
