@@ -2,7 +2,9 @@
 //! and rays must agree on how much light arrives.
 
 mod chi_square;
+mod extremes;
 mod irradiance;
 mod references;
 mod scene_data;
+mod selection;
 mod support;

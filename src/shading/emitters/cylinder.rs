@@ -1,6 +1,6 @@
 //! Cylinders without caps that emit outwards.
 
-use super::bounds::LightBounds;
+use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::sample::{Emission, FromSample, SurfacePoint};
 use crate::math::density::{AreaPdf, EtenduePdf, ProjectedPdf, SolidAnglePdf};
@@ -19,13 +19,16 @@ pub(super) struct Cylinder {
     falloff: Option<Falloff>,
 }
 
-/// What a receiver outside sees: generator lines within `arc` of the unit vector `side`.
+/// A receiver outside, in the plane across the axis.
 struct View {
+    /// Unit vector from the axis to the receiver.
     side: DVec3,
-    arc: f64,
-    /// Distance from the axis, and position along it.
+    /// Distance from the axis.
     height: f64,
+    /// Position along the axis.
     along: f64,
+    /// Half the angle under which the circle is seen.
+    half_angle: f64,
 }
 
 impl Cylinder {
@@ -53,65 +56,57 @@ impl Cylinder {
         // all that is seen from within the radius is the back; false for NaN
         (height > self.radius).then(|| View {
             side: across / height,
-            // acos(r / h), exact for receivers next to the surface
-            arc: ((height - self.radius) * (height + self.radius)).sqrt().atan2(self.radius),
             height,
             along,
+            half_angle: self.radius.atan2(self.tangent(height)),
         })
     }
 
-    /// Density per area of the point at `z` along the generator line at distance `d` from a receiver:
-    /// lines uniform in angle, then equiangular along the line (Kulla and Fajardo 2012).
-    fn area_pdf(&self, v: &View, d: f64, z: f64) -> f64 {
-        let (a, b) = self.line_angles(v, d);
-        let z = z - v.along;
-        d / ((b - a) * (d * d + z * z)) / (2.0 * v.arc * self.radius)
+    /// Length of the tangent to the circle from a distance, exact next to the circle.
+    fn tangent(&self, height: f64) -> f64 {
+        ((height - self.radius) * (height + self.radius)).sqrt()
     }
 
-    /// Angles under which a receiver sees the ends of a line at distance `d`.
-    fn line_angles(&self, v: &View, d: f64) -> (f64, f64) {
-        ((-self.half_length - v.along).atan2(d), (self.half_length - v.along).atan2(d))
+    /// Sines of the elevations of the ends of the line at distance `d`.
+    fn ends(&self, v: &View, d: f64) -> (f64, f64) {
+        let sine = |z: f64| z / z.hypot(d);
+        (sine(-self.half_length - v.along), sine(self.half_length - v.along))
+    }
+
+    /// Density per solid angle: angles across the axis are uniform, and so is the sine of the elevation
+    /// along the line that is met.
+    fn density(&self, v: &View, d: f64) -> SolidAnglePdf {
+        let (a, b) = self.ends(v, d);
+        SolidAnglePdf((0.5 / (v.half_angle * (b - a))) as f32)
     }
 
     pub fn towards(&self, x: Vec3, u: Vec2) -> Option<(SurfacePoint, Vec3)> {
         let v = self.view(x)?;
-        let phi = (2.0 * u.x as f64 - 1.0) * v.arc;
-        let normal = v.side * phi.cos() + self.axis.cross(v.side) * phi.sin();
-        let d = (v.side * v.height - normal * self.radius).length();
-        let (a, b) = self.line_angles(&v, d);
-        let z = v.along + d * (a + (b - a) * u.y as f64).tan();
-        let z = z.clamp(-self.half_length, self.half_length);
-        let point = self.center + self.axis * z + normal * self.radius;
-        let pdf = self.area_pdf(&v, d, z);
-        // distances in double precision: the receiver may be next to the surface
-        let to = point - x.as_dvec3();
-        let distance = to.length();
-        let direction = to / distance;
-        let cos = -normal.dot(direction);
-        let pdf = SolidAnglePdf((pdf * distance * distance / cos) as f32);
+        let (sin, cos) = ((2.0 * u.x as f64 - 1.0) * v.half_angle).sin_cos();
+        // nearer root of the quadratic, by the product of the two
+        let across = (self.radius * self.radius - (v.height * sin).powi(2)).max(0.0).sqrt();
+        let d = self.tangent(v.height).powi(2) / (v.height * cos + across);
+        let (a, b) = self.ends(&v, d);
+        let sin_z = a + (b - a) * u.y as f64;
+        let cos_z = (1.0 - sin_z * sin_z).max(0.0).sqrt();
+        let in_plane = self.axis.cross(v.side) * sin - v.side * cos;
+        let direction = (in_plane * cos_z + self.axis * sin_z).as_vec3();
+        let z = (v.along + d * sin_z / cos_z).clamp(-self.half_length, self.half_length);
+        let normal = (v.side * v.height + in_plane * d) / self.radius;
         let sample = SurfacePoint {
-            direction: direction.as_vec3(),
-            distance: distance as f32,
-            point: point.as_vec3(),
+            direction,
+            distance: d.hypot(z - v.along) as f32,
+            point: (self.center + self.axis * z + normal * self.radius).as_vec3(),
             normal: normal.as_vec3(),
-            pdf,
+            pdf: self.density(&v, d),
         };
-        let sound = cos > 0.0 && distance > 0.0 && pdf.0.is_finite();
-        sound.then(|| (sample, self.emitted(-sample.direction)))
+        (sample.distance > 0.0).then(|| (sample, self.emitted(-direction)))
     }
 
-    pub fn pdf_towards(
-        &self,
-        x: Vec3,
-        point: Vec3,
-        normal: Vec3,
-        direction: Vec3,
-        distance: f32,
-    ) -> SolidAnglePdf {
+    pub fn pdf_towards(&self, x: Vec3, normal: Vec3) -> SolidAnglePdf {
         let Some(v) = self.view(x) else { return SolidAnglePdf(0.0) };
-        let z = (point.as_dvec3() - self.center).dot(self.axis);
         let d = (v.side * v.height - normal.as_dvec3() * self.radius).length();
-        AreaPdf(self.area_pdf(&v, d, z) as f32).to_solid_angle(distance, normal.dot(direction))
+        self.density(&v, d)
     }
 
     pub fn emitted(&self, direction: Vec3) -> Vec3 {
@@ -176,14 +171,11 @@ impl Cylinder {
         }
     }
 
-    pub fn power(&self) -> Vec3 {
+    pub fn power(&self) -> DVec3 {
+        let facing = 4.0 * self.radius * self.half_length;
         match &self.falloff {
-            None => self.radiance * (TAU / 2.0 * self.area()) as f32,
-            Some(f) => {
-                self.radiance
-                    * f.integral_over_cylinder(self.axis.as_vec3())
-                    * (4.0 * self.radius * self.half_length) as f32
-            }
+            None => self.radiance.as_dvec3() * (TAU / 2.0 * self.area()),
+            Some(f) => (self.radiance * f.integral_over_cylinder(self.axis.as_vec3())).as_dvec3() * facing,
         }
     }
 
@@ -193,10 +185,11 @@ impl Cylinder {
         let round = (DVec3::ONE - self.axis * self.axis).max(DVec3::ZERO).powf(0.5) * self.radius;
         let half = ends + round;
         let (min, max) = ((self.center - half).as_vec3(), (self.center + half).as_vec3());
-        let intensity = luminance(self.radiance) * (4.0 * self.radius * self.half_length) as f32;
-        match &self.falloff {
-            None => LightBounds::everywhere(min, max, intensity),
-            Some(f) => LightBounds::cone(min, max, f.axis(), f.cutoff(), false, intensity * f.peak()),
-        }
+        let (cone, peak) = match &self.falloff {
+            None => (Cone::EVERYWHERE, 1.0),
+            Some(f) => (Cone::solid(f.axis(), f.cutoff()), f.peak()),
+        };
+        let facing = 4.0 * self.radius * self.half_length;
+        LightBounds { min, max, cone, intensity: (luminance(self.radiance) * peak) as f64 * facing }
     }
 }

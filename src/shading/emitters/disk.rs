@@ -1,13 +1,13 @@
 //! Disks and ellipses that emit from one side.
 
-use super::bounds::LightBounds;
+use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::plane::{Plane, flat_integral, leave, leave_pdf};
 use super::sample::{FromSample, SurfacePoint};
 use super::spherical_rect::SphericalRect;
 use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
 use crate::math::{luminance, warp};
-use glam::{DVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
 /// An ellipse that emits from one side.
@@ -45,8 +45,7 @@ impl Disk {
 
     fn strategy(&self, x: Vec3) -> Option<Strategy> {
         let height = self.plane.height(x);
-        // false for NaN
-        if !(height > 0.0) {
+        if height.is_nan() || height <= 0.0 {
             return None;
         }
         let foot = self.plane.coordinates(x) * self.axes;
@@ -127,15 +126,15 @@ impl Disk {
         area.with_direction(leave_pdf(self.plane.normal, self.falloff.as_ref(), direction))
     }
 
-    pub fn power(&self) -> Vec3 {
-        self.radiance * flat_integral(self.falloff.as_ref()) * self.area as f32
+    pub fn power(&self) -> DVec3 {
+        (self.radiance * flat_integral(self.falloff.as_ref())).as_dvec3() * self.area
     }
 
     pub fn bounds(&self) -> LightBounds {
         let (min, max) = self.plane.extent(1.0, true);
         let (cutoff, peak) = self.falloff.as_ref().map_or((10.0, 1.0), |f| (f.cutoff(), f.peak()));
-        let intensity = luminance(self.radiance) * self.area as f32 * peak;
-        LightBounds::cone(min, max, self.plane.normal, cutoff, true, intensity)
+        let intensity = (luminance(self.radiance) * peak) as f64 * self.area;
+        LightBounds { min, max, cone: Cone::flat(self.plane.normal, cutoff, false), intensity }
     }
 }
 

@@ -5,7 +5,7 @@ use super::falloff::one_minus_cos;
 use super::sample::{Emission, FromSample, Incident, Receiver, TowardsSample};
 use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
 use crate::math::{Frame, warp};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Light from a cone of directions, the same everywhere.
@@ -90,16 +90,24 @@ impl Distant {
         EtenduePdf(self.pdf_towards(-direction).0 / bounds.disk_area())
     }
 
-    /// Irradiance of a facing surface, and the direction towards the light.
-    pub fn irradiance(&self) -> (Vec3, Vec3) {
-        (self.irradiance, self.frame.n)
+    /// Irradiance of a facing surface.
+    pub fn irradiance(&self) -> Vec3 {
+        self.irradiance
+    }
+
+    /// Unit direction towards the light and sine of the half angle; `None` where it is more than half of
+    /// all directions.
+    pub fn cone(&self) -> Option<(Vec3, f32)> {
+        let h = self.one_minus_cos;
+        (h < 1.0).then(|| (self.frame.n, (h * (2.0 - h)).sqrt()))
     }
 
     /// Radiance integrated over all directions.
-    pub fn fluence(&self) -> Vec3 {
-        match self.one_minus_cos > 0.0 {
+    pub fn fluence(&self) -> DVec3 {
+        let fluence = match self.one_minus_cos > 0.0 {
             true => self.radiance * warp::cone_solid_angle(self.one_minus_cos),
             false => self.irradiance,
-        }
+        };
+        fluence.as_dvec3()
     }
 }

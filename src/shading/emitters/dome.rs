@@ -5,7 +5,7 @@ use super::map_sampler::MapSampler;
 use super::sample::{Emission, FromSample, Incident, Receiver, TowardsSample};
 use crate::math::density::{EtenduePdf, SolidAnglePdf};
 use crate::math::{Frame, warp};
-use glam::{Mat3, Vec2, Vec3};
+use glam::{DVec3, Mat3, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Light from infinity, all around.
@@ -78,8 +78,9 @@ impl Dome {
     }
 
     /// Radiance integrated over all directions.
-    pub fn fluence(&self) -> Vec3 {
-        self.radiance * self.map.as_ref().map_or(Vec3::ONE, MapSampler::mean) * (4.0 * PI)
+    pub fn fluence(&self) -> DVec3 {
+        let mean = self.radiance * self.map.as_ref().map_or(Vec3::ONE, MapSampler::mean);
+        mean.as_dvec3() * (4.0 * PI as f64)
     }
 }
 

@@ -9,13 +9,15 @@ use super::falloff::Falloff;
 use super::map_sampler::{Layout, MapSampler};
 use super::point::Point;
 use super::rect::Rect;
-use super::sample::{EmitterHit, FromSample, Incident, Receiver, SurfacePoint, TowardsSample};
+use super::sample::{EmitterHit, EmitterId, FromSample, Incident, Receiver, SurfacePoint, TowardsSample};
 use super::scene_bounds::SceneBounds;
+use super::selection::Infinite;
 use super::sphere::Sphere;
 use crate::math::density::{EtenduePdf, SolidAnglePdf};
+use crate::math::luminance;
 use crate::scene::light::{Light, LightKind, Shaping};
 use crate::scene::{Image, SceneError};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::sync::Arc;
 
 /// An analytic light, ready to be sampled.
@@ -74,11 +76,6 @@ impl Emitter {
         })
     }
 
-    /// Whether it shines from infinity.
-    pub fn is_infinite(&self) -> bool {
-        matches!(self, Self::Distant(_) | Self::Dome(_))
-    }
-
     /// Whether a ray can meet it at a finite distance.
     pub fn is_hittable(&self) -> bool {
         matches!(self, Self::Rect(_) | Self::Disk(_) | Self::Sphere(_) | Self::Cylinder(_))
@@ -104,7 +101,7 @@ impl Emitter {
             Self::Rect(l) => l.pdf_towards(x, hit.point, direction, hit.distance),
             Self::Disk(l) => l.pdf_towards(x, hit.point, direction, hit.distance),
             Self::Sphere(l) => l.pdf_towards(x),
-            Self::Cylinder(l) => l.pdf_towards(x, hit.point, hit.normal, direction, hit.distance),
+            Self::Cylinder(l) => l.pdf_towards(x, hit.normal),
             Self::Point(_) => SolidAnglePdf(0.0),
             Self::Distant(l) => l.pdf_towards(direction),
             Self::Dome(l) => l.pdf_towards(receiver, direction),
@@ -168,16 +165,39 @@ impl Emitter {
     }
 
     /// Power; from infinity, that through the sphere around the scene.
-    pub fn power(&self, bounds: &SceneBounds) -> Vec3 {
+    pub fn power(&self, bounds: &SceneBounds) -> DVec3 {
         match self {
             Self::Rect(l) => l.power(),
             Self::Disk(l) => l.power(),
             Self::Sphere(l) => l.power(),
             Self::Cylinder(l) => l.power(),
             Self::Point(l) => l.power(),
-            Self::Distant(l) => l.fluence() * bounds.disk_area(),
-            Self::Dome(l) => l.fluence() * bounds.disk_area(),
+            Self::Distant(l) => l.fluence() * bounds.disk_area() as f64,
+            Self::Dome(l) => l.fluence() * bounds.disk_area() as f64,
         }
+    }
+
+    /// Bounds in space and direction; `None` for what is infinitely far away.
+    pub fn bounds(&self) -> Option<LightBounds> {
+        Some(match self {
+            Self::Rect(l) => l.bounds(),
+            Self::Disk(l) => l.bounds(),
+            Self::Sphere(l) => l.bounds(),
+            Self::Cylinder(l) => l.bounds(),
+            Self::Point(l) => l.bounds(),
+            Self::Distant(_) | Self::Dome(_) => return None,
+        })
+    }
+
+    /// What the choice of emitter `id` needs to know of it; `None` for what is at a finite distance.
+    pub fn infinite(&self, id: EmitterId) -> Option<Infinite> {
+        let (irradiance, cone) = match self {
+            Self::Distant(l) => (l.irradiance().as_dvec3(), l.cone()),
+            // the mean over all orientations of a surface
+            Self::Dome(l) => (l.fluence() / 4.0, None),
+            _ => return None,
+        };
+        Some(Infinite { id, irradiance: luminance64(irradiance), cone })
     }
 }
 
@@ -193,4 +213,10 @@ pub(super) fn towards_surface(at: SurfacePoint, radiance: Vec3) -> Option<Toward
         incident: Incident::Radiance { radiance, pdf },
         barycentrics: None,
     })
+}
+
+/// Luminance in double precision: powers and intensities may leave the range of single precision.
+pub(super) fn luminance64(c: DVec3) -> f64 {
+    let scale = c.max_element();
+    if scale > 0.0 { luminance((c / scale).as_vec3()) as f64 * scale } else { 0.0 }
 }

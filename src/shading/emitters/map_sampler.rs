@@ -172,9 +172,6 @@ impl MapSampler {
     /// Point of the unit square, and its density per unit of the layout's measure. `None` where the
     /// image is black.
     pub fn sample(&self, u: Vec2) -> Option<(Vec2, f32)> {
-        if !(self.total() > 0.0) {
-            return None;
-        }
         let (mut x, mut y, mut u) = (0, 0, u);
         for level in (0..self.levels.len()).rev() {
             let child = |dx: usize, dy: usize| match level {
@@ -230,8 +227,7 @@ impl MapSampler {
 fn choose(a: f32, b: f32, u: f32) -> Option<(usize, f32)> {
     let p = a / (a + b);
     match u < p {
-        // false for NaN
-        _ if !(a + b > 0.0) => None,
+        _ if a + b <= 0.0 => None,
         true => Some((0, (u / p).min(ONE_MINUS_EPSILON))),
         false => Some((1, ((u - p) / (1.0 - p)).min(ONE_MINUS_EPSILON))),
     }

@@ -9,23 +9,28 @@ mod distant;
 mod dome;
 mod emitter;
 mod falloff;
+mod hit_tree;
+mod light_tree;
 mod map_sampler;
 mod plane;
 mod point;
 mod rect;
 mod sample;
 mod scene_bounds;
+mod selection;
 mod sphere;
 mod spherical_rect;
+mod tree;
 mod triangle;
 mod triangle_table;
 
 use crate::math::density::{DiscreteProbability, EtenduePdf, SolidAnglePdf};
 use crate::math::distribution::AliasTable;
-use crate::math::luminance;
 use crate::scene::{Image, Light, SceneError, Warnings};
-use emitter::Emitter;
-use glam::{Vec2, Vec3};
+use emitter::{Emitter, luminance64};
+use glam::{DVec3, Vec2, Vec3};
+use hit_tree::HitTree;
+use selection::Selector;
 use std::sync::Arc;
 use triangle::Triangle;
 use triangle_table::TriangleTable;
@@ -42,7 +47,8 @@ pub struct Emitters {
     triangles: Vec<Triangle>,
     table: TriangleTable,
     infinite: Vec<EmitterId>,
-    hittable: Vec<EmitterId>,
+    hittable: HitTree,
+    selector: Selector,
     by_power: Option<AliasTable>,
     total_power: Vec3,
     bounds: SceneBounds,
@@ -72,22 +78,25 @@ impl Emitters {
             let count = (triangles.len() - kept.len()) as u64;
             warnings.add("emissive meshes", "triangles without area or radiance do not emit", count);
         }
-        let ids = |keep: fn(&Emitter) -> bool| {
-            let all = lights.iter().enumerate().filter(|(_, l)| keep(l));
-            all.map(|(i, _)| EmitterId(i as u32)).collect::<Vec<_>>()
-        };
-        let (infinite, hittable) = (ids(Emitter::is_infinite), ids(Emitter::is_hittable));
+        let numbered = || (0..).zip(&lights);
+        let infinite: Vec<_> = numbered().filter_map(|(i, l)| l.infinite(EmitterId(i))).collect();
+        let shapes = numbered().filter(|(_, l)| l.is_hittable());
+        let hittable = HitTree::new(shapes.filter_map(|(i, l)| l.bounds().map(|b| (i, b.min, b.max))));
+        let first = lights.len() as u32;
+        let bounded = numbered().filter_map(|(i, l)| Some((i, l.bounds()?)));
+        let bounded = bounded.chain((first..).zip(&kept).map(|(i, t)| (i, t.bounds())));
         let power = |l: &Emitter| l.power(&bounds);
-        let powers: Vec<Vec3> = lights.iter().map(power).chain(kept.iter().map(Triangle::power)).collect();
-        let table = TriangleTable::new(&places, lights.len() as u32);
+        let powers: Vec<DVec3> = lights.iter().map(power).chain(kept.iter().map(Triangle::power)).collect();
+        let table = TriangleTable::new(&places, first);
         Ok(Self {
-            by_power: AliasTable::new(powers.iter().map(|&p| luminance(p) as f64)),
-            total_power: powers.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>().as_vec3(),
+            by_power: AliasTable::new(powers.iter().map(|&p| luminance64(p))),
+            total_power: powers.iter().sum::<DVec3>().as_vec3(),
+            infinite: infinite.iter().map(|i| i.id).collect(),
+            selector: Selector::new(bounded, infinite, lights.len() + kept.len()),
             lights,
             camera_visible,
             triangles: kept,
             table,
-            infinite,
             hittable,
             bounds,
         })
@@ -110,10 +119,11 @@ impl Emitters {
 
     /// Power of one emitter, as in [`Emitters::total_power`].
     pub fn power(&self, id: EmitterId) -> Vec3 {
-        match self.get(id) {
+        let power = match self.get(id) {
             Kind::Light(l) => l.power(&self.bounds),
             Kind::Triangle(t) => t.power(),
-        }
+        };
+        power.as_vec3()
     }
 
     /// Whether camera rays see an emitter; triangles leave that to their instance.
@@ -185,15 +195,16 @@ impl Emitters {
     /// Calls `found` for every analytic light that the ray meets nearer than `t_max`, in no particular
     /// order. `direction` is a unit vector. Triangles and what is at infinity are not among them.
     pub fn for_each_hit(&self, origin: Vec3, direction: Vec3, t_max: f32, mut found: impl FnMut(EmitterHit)) {
-        for &id in &self.hittable {
-            if let Some((distance, normal)) = self.lights[id.0 as usize].hit(origin, direction)
+        self.hittable.for_each(origin, direction, t_max, |i| {
+            let light = &self.lights[i as usize];
+            if let Some((distance, normal)) = light.hit(origin, direction)
                 && distance < t_max
             {
                 let point = origin + direction * distance;
-                let radiance = self.lights[id.0 as usize].emitted(point, -direction);
-                found(EmitterHit { emitter: id, distance, point, normal, radiance });
+                let radiance = light.emitted(point, -direction);
+                found(EmitterHit { emitter: EmitterId(i), distance, point, normal, radiance });
             }
-        }
+        });
     }
 
     /// Calls `found` for every dome and every distant light of some extent that is seen along the unit
@@ -208,13 +219,13 @@ impl Emitters {
     }
 
     /// Chooses an emitter for a receiver: the emitter, its probability, and `u` made uniform again.
-    pub fn select(&self, _receiver: &Receiver, u: f32) -> Option<(EmitterId, DiscreteProbability, f32)> {
-        self.select_emission(u)
+    pub fn select(&self, receiver: &Receiver, u: f32) -> Option<(EmitterId, DiscreteProbability, f32)> {
+        self.selector.select(receiver, u)
     }
 
     /// Probability with which [`Emitters::select`] chooses an emitter.
-    pub fn probability(&self, _receiver: &Receiver, id: EmitterId) -> DiscreteProbability {
-        self.emission_probability(id)
+    pub fn probability(&self, receiver: &Receiver, id: EmitterId) -> DiscreteProbability {
+        self.selector.probability(receiver, id)
     }
 
     /// Chooses an emitter in proportion to its power, to start a light path: the emitter, its

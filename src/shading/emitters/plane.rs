@@ -52,12 +52,10 @@ impl Plane {
         let (o, d) = (origin.as_dvec3() - self.center.as_dvec3(), direction.as_dvec3());
         let n = self.normal.as_dvec3();
         let t = -o.dot(n) / d.dot(n);
-        // NaN where the ray lies in the plane
-        if !(d.dot(n) < 0.0 && t > 0.0) {
-            return None;
-        }
         let p = o + d * t;
-        Some((t, DVec2::new(p.dot(self.dual[0]), p.dot(self.dual[1]))))
+        // t is NaN where the ray lies in the plane
+        let met = d.dot(n) < 0.0 && t > 0.0;
+        met.then(|| (t, DVec2::new(p.dot(self.dual[0]), p.dot(self.dual[1]))))
     }
 
     /// Lower and upper corner of the box around the points whose coordinates are within `reach` of zero,

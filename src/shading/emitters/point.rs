@@ -1,11 +1,11 @@
 //! Points that emit to all sides, or into a cone.
 
-use super::bounds::LightBounds;
+use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::sample::{Emission, FromSample, Incident, TowardsSample};
 use crate::math::density::SolidAnglePdf;
 use crate::math::{luminance, warp};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// A light without size.
@@ -47,7 +47,7 @@ impl Point {
             None => (warp::uniform_sphere(u), 0.25 / PI),
         };
         let intensity = self.intensity(direction);
-        (intensity != Vec3::ZERO).then(|| FromSample {
+        (intensity != Vec3::ZERO).then_some(FromSample {
             origin: self.position,
             normal: direction,
             direction,
@@ -56,15 +56,17 @@ impl Point {
         })
     }
 
-    pub fn power(&self) -> Vec3 {
-        self.intensity * self.falloff.as_ref().map_or(Vec3::splat(4.0 * PI), Falloff::integral)
+    pub fn power(&self) -> DVec3 {
+        let angles = self.falloff.as_ref().map_or(Vec3::splat(4.0 * PI), Falloff::integral);
+        (self.intensity * angles).as_dvec3()
     }
 
     pub fn bounds(&self) -> LightBounds {
-        let (p, intensity) = (self.position, luminance(self.intensity));
-        match &self.falloff {
-            None => LightBounds::everywhere(p, p, intensity),
-            Some(f) => LightBounds::cone(p, p, f.axis(), f.cutoff(), false, intensity * f.peak()),
-        }
+        let (cone, peak) = match &self.falloff {
+            None => (Cone::EVERYWHERE, 1.0),
+            Some(f) => (Cone::solid(f.axis(), f.cutoff()), f.peak()),
+        };
+        let intensity = (luminance(self.intensity) * peak) as f64;
+        LightBounds { min: self.position, max: self.position, cone, intensity }
     }
 }

@@ -1,6 +1,6 @@
 //! Rectangles and parallelograms that emit from one side.
 
-use super::bounds::LightBounds;
+use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::map_sampler::MapSampler;
 use super::plane::{Plane, flat_integral, leave, leave_pdf};
@@ -8,7 +8,7 @@ use super::sample::{FromSample, SurfacePoint};
 use super::spherical_rect::SphericalRect;
 use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
 use crate::math::luminance;
-use glam::{DVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// A parallelogram that emits from one side.
 #[derive(Clone, Debug)]
@@ -51,8 +51,7 @@ impl Rect {
 
     fn strategy(&self, x: Vec3) -> Option<Strategy> {
         let height = self.plane.height(x);
-        // false for NaN
-        if !(height > 0.0) {
+        if height.is_nan() || height <= 0.0 {
             return None;
         }
         if self.map.is_some() {
@@ -159,17 +158,17 @@ impl Rect {
         self.area_pdf(point).with_direction(leave_pdf(self.plane.normal, self.falloff.as_ref(), direction))
     }
 
-    pub fn power(&self) -> Vec3 {
+    pub fn power(&self) -> DVec3 {
         let image = self.map.as_ref().map_or(Vec3::ONE, MapSampler::mean);
-        self.radiance * image * flat_integral(self.falloff.as_ref()) * self.area as f32
+        (self.radiance * image * flat_integral(self.falloff.as_ref())).as_dvec3() * self.area
     }
 
     pub fn bounds(&self) -> LightBounds {
         let (min, max) = self.plane.extent(0.5, false);
         let image = self.map.as_ref().map_or(Vec3::ONE, MapSampler::mean);
         let (cutoff, peak) = self.falloff.as_ref().map_or((10.0, 1.0), |f| (f.cutoff(), f.peak()));
-        let intensity = luminance(self.radiance * image) * self.area as f32 * peak;
-        LightBounds::cone(min, max, self.plane.normal, cutoff, true, intensity)
+        let intensity = (luminance(self.radiance * image) * peak) as f64 * self.area;
+        LightBounds { min, max, cone: Cone::flat(self.plane.normal, cutoff, false), intensity }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Spheres that emit outwards.
 
-use super::bounds::LightBounds;
+use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::sample::{Emission, FromSample, SurfacePoint};
 use crate::math::density::{AreaPdf, EtenduePdf, ProjectedPdf, SolidAnglePdf};
@@ -19,7 +19,7 @@ pub(super) struct Sphere {
 }
 
 /// The sphere as seen from a receiver outside of it.
-struct Cone {
+struct View {
     to_center: DVec3,
     distance: f64,
     sin2: f64,
@@ -31,21 +31,21 @@ impl Sphere {
         Self { center: center.as_dvec3(), radius: radius as f64, radiance, falloff }
     }
 
-    fn cone(&self, x: Vec3) -> Option<Cone> {
+    fn view(&self, x: Vec3) -> Option<View> {
         let to_center = self.center - x.as_dvec3();
         let distance = to_center.length();
-        // no light inside; false for NaN
-        if !(distance > self.radius) {
+        // inside there is no light
+        if distance.is_nan() || distance <= self.radius {
             return None;
         }
         let sin2 = (self.radius / distance).powi(2);
         // (d - r)(d + r) keeps the cosine exact next to the surface, sin^2/(1 + cos) its rest far away
         let cos = ((distance - self.radius) * (distance + self.radius)).sqrt() / distance;
-        Some(Cone { to_center, distance, sin2, one_minus_cos: sin2 / (1.0 + cos) })
+        Some(View { to_center, distance, sin2, one_minus_cos: sin2 / (1.0 + cos) })
     }
 
     pub fn towards(&self, x: Vec3, u: Vec2) -> Option<(SurfacePoint, Vec3)> {
-        let c = self.cone(x)?;
+        let c = self.view(x)?;
         let h = u.x as f64 * c.one_minus_cos;
         let (sin2, cos) = (h * (2.0 - h), 1.0 - h);
         // angle at the centre between the line to the receiver and the sampled point (pbrt-v4, 6.2.4)
@@ -69,7 +69,7 @@ impl Sphere {
     }
 
     pub fn pdf_towards(&self, x: Vec3) -> SolidAnglePdf {
-        SolidAnglePdf(self.cone(x).map_or(0.0, |c| (1.0 / (TAU * c.one_minus_cos)) as f32))
+        SolidAnglePdf(self.view(x).map_or(0.0, |c| (1.0 / (TAU * c.one_minus_cos)) as f32))
     }
 
     pub fn emitted(&self, direction: Vec3) -> Vec3 {
@@ -124,18 +124,19 @@ impl Sphere {
         }
     }
 
-    pub fn power(&self) -> Vec3 {
+    pub fn power(&self) -> DVec3 {
         let angles = self.falloff.as_ref().map_or(Vec3::splat(4.0 * PI), Falloff::integral);
-        self.radiance * angles * (TAU / 2.0 * self.radius * self.radius) as f32
+        (self.radiance * angles).as_dvec3() * (TAU / 2.0 * self.radius * self.radius)
     }
 
     pub fn bounds(&self) -> LightBounds {
         let half = DVec3::splat(self.radius);
         let (min, max) = ((self.center - half).as_vec3(), (self.center + half).as_vec3());
-        let intensity = luminance(self.radiance) * (TAU / 2.0 * self.radius * self.radius) as f32;
-        match &self.falloff {
-            None => LightBounds::everywhere(min, max, intensity),
-            Some(f) => LightBounds::cone(min, max, f.axis(), f.cutoff(), false, intensity * f.peak()),
-        }
+        let (cone, peak) = match &self.falloff {
+            None => (Cone::EVERYWHERE, 1.0),
+            Some(f) => (Cone::solid(f.axis(), f.cutoff()), f.peak()),
+        };
+        let facing = TAU / 2.0 * self.radius * self.radius;
+        LightBounds { min, max, cone, intensity: (luminance(self.radiance) * peak) as f64 * facing }
     }
 }

@@ -1,11 +1,12 @@
 //! Emissive triangles of meshes.
 
-use super::bounds::LightBounds;
+use super::bounds::{Cone, LightBounds};
 use super::sample::{Emission, FromSample, SurfacePoint};
 use crate::math::density::{AreaPdf, EtenduePdf, ProjectedPdf, SolidAnglePdf};
 use crate::math::{Frame, luminance, warp};
-use glam::{Vec2, Vec3};
-use std::f32::consts::{FRAC_1_PI, PI};
+use glam::{DVec3, Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
+use std::f64::consts::PI;
 
 /// An emissive triangle as the caller hands it over.
 #[derive(Clone, Copy, Debug)]
@@ -102,16 +103,19 @@ impl Triangle {
         AreaPdf(1.0 / area).with_direction(ProjectedPdf(pdf))
     }
 
-    pub fn power(&self) -> Vec3 {
+    pub fn power(&self) -> DVec3 {
         let sides = if self.two_sided { 2.0 } else { 1.0 };
-        self.radiance * (PI * sides * self.geometry().1)
+        self.radiance.as_dvec3() * (PI * sides * self.geometry().1 as f64)
     }
 
     pub fn bounds(&self) -> LightBounds {
         let [a, b, c] = [self.vertex, self.vertex + self.edges[0], self.vertex + self.edges[1]];
         let (normal, area) = self.geometry();
-        let intensity = luminance(self.radiance) * area;
-        let bounds = LightBounds::cone(a.min(b).min(c), a.max(b).max(c), normal, 10.0, true, intensity);
-        LightBounds { two_sided: self.two_sided, ..bounds }
+        LightBounds {
+            min: a.min(b).min(c),
+            max: a.max(b).max(c),
+            cone: Cone::flat(normal, PI / 2.0, self.two_sided),
+            intensity: luminance(self.radiance) as f64 * area as f64,
+        }
     }
 }
