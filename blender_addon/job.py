@@ -10,7 +10,7 @@ import numpy as np
 
 from . import library, passes
 from .export.camera import export_camera
-from .export.depsgraph import export_scene
+from .export.depsgraph import Exporter
 from .export.settings import film_size, render_settings
 from .log import ExportLog
 
@@ -143,14 +143,15 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
         )
 
     engine.update_stats(frame.layer, "Exporting the scene")
-    scene = export_scene(segue, depsgraph, log, engine.stop_requested)
-    if scene is None:
+    exporter = Exporter(segue, depsgraph, log, engine.stop_requested)
+    if not exporter.run():
         return
+    scene = exporter.scene
     views = frame.views()
     for index, view in enumerate(views):
         if view:
             engine.active_view_set(view)
-        export_camera(scene, engine, depsgraph, log)
+        export_camera(exporter, engine, depsgraph, log)
         settings = render_settings(depsgraph, frame, film_size(engine), preview=engine.is_preview)
         if index == 0:
             _report(engine, log, scene.info())

@@ -6,9 +6,12 @@ import math
 from typing import Any
 
 import bpy
+import numpy as np
 from mathutils import Matrix
 
 from ..log import ExportLog
+from .depsgraph import Exporter
+from .extent import Extent
 
 
 def camera_window(
@@ -61,6 +64,7 @@ def camera_json(
     resolution: tuple[int, int],
     pixel_aspect: tuple[float, float],
     shift_x: float,
+    extent: Extent,
     log: ExportLog,
 ) -> dict[str, Any]:
     """The camera object of the ABI; `matrix` is camera to world without scale."""
@@ -76,8 +80,11 @@ def camera_json(
         "transform": [value for row in matrix for value in row],
         "window": camera_window(camera, resolution, pixel_aspect, shift_x),
         "near": camera.clip_start,
-        "far": camera.clip_end,
     }
+    # The world is seen behind Blender's far plane; so one that cuts nothing is not passed on.
+    view = np.array(matrix)
+    if extent.farthest(view[:3, 3], -view[:3, 2]) > camera.clip_end:
+        result["far"] = camera.clip_end
     dof = camera.dof
     if dof.use_dof:
         stop = max(dof.aperture_fstop, 1e-5)
@@ -98,7 +105,10 @@ def camera_json(
 
 
 def export_camera(
-    scene: Any, engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsgraph, log: ExportLog
+    exporter: Exporter,
+    engine: bpy.types.RenderEngine,
+    depsgraph: bpy.types.Depsgraph,
+    log: ExportLog,
 ) -> None:
     """Set the camera of the engine's active view."""
     camera = engine.camera_override
@@ -111,6 +121,7 @@ def export_camera(
         (engine.resolution_x, engine.resolution_y),
         (render.pixel_aspect_x, render.pixel_aspect_y),
         engine.camera_shift_x(camera),
+        exporter.extent,
         log,
     )
-    scene.set_camera(camera.name, data)
+    exporter.scene.set_camera(camera.name, data)

@@ -4,78 +4,95 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any
 
 import bpy
+import numpy as np
 
 from ..log import ExportLog
 from ..nodes.material import Translator
-from .instances import Survey, survey
+from .extent import Extent
+from .instances import Group, Survey, survey
 from .lights import light_json
-from .mesh import export_mesh
+from .mesh import MeshArrays, add_mesh
 from .world import export_world
 
 
-def export_scene(
-    segue: ModuleType, depsgraph: bpy.types.Depsgraph, log: ExportLog, stop: Callable[[], bool]
-) -> Any | None:
-    """A `segue.Scene` without its camera; None when the user wants to stop."""
-    scene = segue.Scene()
-    _warn_scene(depsgraph, log)
-    found = survey(depsgraph, log, stop)
-    if found is None:
-        return None
-    translator = Translator(scene, log)
-    materials = [
-        [translator.material(material) for material in group.traits.materials]
-        for group in found.groups
-    ]
-    if not _export_meshes(segue, scene, found, materials, translator, stop):
-        return None
-    for entry in found.lights:
-        data = light_json(
-            entry.name,
-            entry.light,
-            found.matrices[entry.index],
-            entry.camera_visible,
-            translator,
-            log,
-        )
-        if data is not None:
-            scene.add_light(entry.name, data)
-    export_world(scene, depsgraph, translator, log)
-    return scene
+class Exporter:
+    """Fills `scene` with all but the camera, and learns the `extent` of its surfaces."""
 
+    def __init__(
+        self,
+        segue: ModuleType,
+        depsgraph: bpy.types.Depsgraph,
+        log: ExportLog,
+        stop: Callable[[], bool],
+    ) -> None:
+        self.scene = segue.Scene()
+        self.extent = Extent()
+        self._segue = segue
+        self._depsgraph = depsgraph
+        self._log = log
+        self._stop = stop
+        self._translator = Translator(self.scene, log)
+        # Mesh pointer -> id and corners of the box; None for a mesh without faces.
+        self._meshes: dict[int, tuple[int, np.ndarray] | None] = {}
 
-def _export_meshes(
-    segue: ModuleType,
-    scene: Any,
-    found: Survey,
-    materials: list[list[int]],
-    translator: Translator,
-    stop: Callable[[], bool],
-) -> bool:
-    """Add every mesh once and all its instances; false when the user wants to stop."""
-    meshes: dict[int, int | None] = {}
-    for group, slots in zip(found.groups, materials, strict=True):
-        if stop():
+    def run(self) -> bool:
+        """Export everything; false when the user wants to stop."""
+        _warn_scene(self._depsgraph, self._log)
+        found = survey(self._depsgraph, self._log, self._stop)
+        if found is None:
             return False
+        # Materials come first: they tell which attributes of the meshes are read.
+        slots = [
+            [self._translator.material(material) for material in group.traits.materials]
+            for group in found.groups
+        ]
+        for group, materials in zip(found.groups, slots, strict=True):
+            if self._stop():
+                return False
+            self._add_group(group, materials, found)
+        self._add_lights(found)
+        export_world(self.scene, self._depsgraph, self._translator, self._log)
+        return True
+
+    def _add_group(self, group: Group, materials: list[int], found: Survey) -> None:
+        """Add the instances of a group, and its mesh when it is met for the first time."""
         pointer = group.mesh.as_pointer()
-        if pointer not in meshes:
-            meshes[pointer] = export_mesh(segue, scene, group.mesh, translator.attributes)
-        mesh = meshes[pointer]
-        if mesh is None:
-            continue
-        scene.add_instances(
+        if pointer not in self._meshes:
+            arrays = MeshArrays(group.mesh)
+            self._meshes[pointer] = None
+            if arrays.triangle_count:
+                mesh = add_mesh(self._segue, self.scene, arrays, self._translator.attributes)
+                self._meshes[pointer] = (mesh, arrays.box())
+        entry = self._meshes[pointer]
+        if entry is None:
+            return
+        mesh, box = entry
+        transforms = found.matrices[group.members]
+        self.extent.add(box, transforms)
+        self.scene.add_instances(
             group.traits.name,
             mesh,
-            found.matrices[group.members],
-            materials=slots,
+            transforms,
+            materials=materials,
             camera_visible=group.traits.camera_visible,
             two_sided_emission=True,
             object_index=group.traits.pass_index,
         )
-    return True
+
+    def _add_lights(self, found: Survey) -> None:
+        for entry in found.lights:
+            data = light_json(
+                entry.name,
+                entry.light,
+                found.matrices[entry.index],
+                entry.camera_visible,
+                self._translator,
+                self._log,
+            )
+            if data is not None:
+                self.scene.add_light(entry.name, data)
 
 
 def _warn_scene(depsgraph: bpy.types.Depsgraph, log: ExportLog) -> None:

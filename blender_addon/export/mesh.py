@@ -64,6 +64,10 @@ class MeshArrays:
         self.indices = corner_points.astype(np.uint32)[self.corners]
         self.polygons = _get(mesh.loop_triangle_polygons, "value", self.triangle_count, np.int32)
 
+    def box(self) -> np.ndarray:
+        """Lowest and highest coordinates, (2, 3)."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)]).astype(np.float64)
+
     def slots(self) -> np.ndarray | None:
         """Material slot of each triangle; None where all are 0."""
         attribute = self.mesh.attributes.get("material_index")
@@ -116,13 +120,8 @@ class MeshArrays:
         return None
 
 
-def export_mesh(
-    segue: Any, scene: Any, mesh: bpy.types.Mesh, wanted: Collection[str]
-) -> int | None:
-    """Add a mesh with its UV maps and the `wanted` attributes; None if it has no faces."""
-    arrays = MeshArrays(mesh)
-    if not arrays.triangle_count:
-        return None
+def add_mesh(segue: Any, scene: Any, arrays: MeshArrays, wanted: Collection[str]) -> int:
+    """Add a mesh with its UV maps and those of the `wanted` attributes that it has."""
     normals, interpolation = arrays.normals()
     uv_maps = arrays.uv_maps()
     attributes = [
@@ -135,7 +134,7 @@ def export_mesh(
             values, domain, indices = found
             attributes.append(segue.Attribute(name, values, domain, indices=indices))
     return scene.add_mesh(
-        mesh.name,
+        arrays.mesh.name,
         arrays.points,
         arrays.indices,
         normals=normals,
