@@ -34,20 +34,38 @@ def blender_python() -> str:
     return sys.executable
 
 
+@pytest.fixture(scope="session")
+def archive(blender_python: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The extension's archive, built with the library under test."""
+    need_library()
+    command = [sys.executable, REPOSITORY / "blender_addon" / "build.py", "--output"]
+    output = tmp_path_factory.mktemp("archive")
+    environment = os.environ | {"SEGUE_LIBRARY": str(library())}
+    subprocess.run([*command, output], env=environment, check=True)
+    (path,) = output.glob("*.zip")
+    return path
+
+
 @pytest.fixture
-def run_case(blender_python: str, tmp_path: Path) -> RunCase:
+def run_case(blender_python: str, tmp_path: Path, request: pytest.FixtureRequest) -> RunCase:
     """Run one case; its failure is the test's, with all that Blender printed."""
 
     def run(module: str, name: str, engine: str) -> None:
-        if engine == "real" and not library().exists():
-            pytest.skip(f"the engine library is not built: {library()} is not there")
+        path = [HERE]
         environment = os.environ | {
             "BLENDER_USER_RESOURCES": str(tmp_path / "resources"),
-            "PYTHONPATH": os.pathsep.join([str(HERE), str(REPOSITORY), str(REPOSITORY / "python")]),
             "SEGUE_TEST_OUTPUT": str(tmp_path),
         }
+        if engine == "installed":
+            # Only what the archive brings may be found.
+            environment["SEGUE_TEST_ARCHIVE"] = str(request.getfixturevalue("archive"))
+            environment.pop("SEGUE_LIBRARY", None)
+        else:
+            path += [REPOSITORY, REPOSITORY / "python"]
         if engine == "real":
+            need_library()
             environment["SEGUE_LIBRARY"] = str(library())
+        environment["PYTHONPATH"] = os.pathsep.join(map(str, path))
         process = subprocess.run(
             [blender_python, str(HERE / "harness.py"), module, name, engine],
             env=environment,
@@ -66,6 +84,12 @@ def run_case(blender_python: str, tmp_path: Path) -> RunCase:
         )
 
     return run
+
+
+def need_library() -> None:
+    """Skip where the engine is not built."""
+    if not library().exists():
+        pytest.skip(f"the engine library is not built: {library()} is not there")
 
 
 def library() -> Path:

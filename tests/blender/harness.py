@@ -1,4 +1,4 @@
-"""Runs one case inside Blender: `python harness.py MODULE CASE fake|real`."""
+"""Runs one case inside Blender: `python harness.py MODULE CASE fake|real|installed`."""
 
 from __future__ import annotations
 
@@ -13,17 +13,21 @@ class SkipCaseError(Exception):
 
 
 def main() -> int:
-    """Register the add-on, run the case in an empty file, unregister; the exit code tells."""
+    """Register the add-on, run the case in an empty file, unregister; the exit code tells.
+
+    A case for the "installed" engine installs the add-on itself.
+    """
     module_name, case_name, engine = sys.argv[1:4]
     import bpy
 
     if engine == "fake":
         sys.modules["segue"] = importlib.import_module("fake_segue")
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    import blender_addon
-
     code = 0
-    blender_addon.register()
+    if engine != "installed":
+        import blender_addon
+
+        blender_addon.register()
     try:
         case = getattr(importlib.import_module(f"cases.{module_name}"), case_name)
         case()
@@ -33,7 +37,8 @@ def main() -> int:
     except BaseException:
         traceback.print_exc()
         code = 1
-    blender_addon.unregister()
+    if engine != "installed":
+        blender_addon.unregister()
     return code
 
 

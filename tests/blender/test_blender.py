@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
-# Module of cases -> engine: "fake" records what the add-on exports, "real" renders.
+# Module of cases -> engine: "fake" records what the add-on exports, "real" renders, "installed" is
+# the extension's archive.
 MODULES = {
     "camera": "fake",
     "engine": "fake",
+    "extension": "installed",
     "failures": "fake",
     "geometry": "fake",
     "lights": "fake",
