@@ -169,8 +169,7 @@ def branches(rng: np.random.Generator) -> tuple[Mesh, Array]:
         knots[1:] += rng.normal(0, 0.022, (5, 3))
         path = curve(knots, 3)
         twigs.append(tube(path, 0.0035, 5))
-        for at in path[5:]:
-            buds.append(at + rng.normal(0, 0.006, 3))
+        buds.extend(at + rng.normal(0, 0.006, 3) for at in path[5:])
     return merged(twigs), np.array(buds)
 
 

@@ -90,8 +90,12 @@ def cut_ball(radius: float) -> Mesh:
 def ring() -> Mesh:
     """A broad finger ring of polished brass, lying flat: its inside throws a heart of light."""
     profile = np.concatenate(
-        [arc((0.0247, 0.0012), 0.0012, -90, 0, 4), arc((0.0247, 0.0148), 0.0012, 0, 90, 4)]
-        + [arc((0.0237, 0.0152), 0.0008, 90, 180, 4), arc((0.0237, 0.0008), 0.0008, 180, 270, 4)]
+        [
+            arc((0.0247, 0.0012), 0.0012, -90, 0, 4),
+            arc((0.0247, 0.0148), 0.0012, 0, 90, 4),
+            arc((0.0237, 0.0152), 0.0008, 90, 180, 4),
+            arc((0.0237, 0.0008), 0.0008, 180, 270, 4),
+        ]
     )
     return lathe(profile, 128, crease=50, ring=True)
 

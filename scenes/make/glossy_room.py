@@ -1,4 +1,4 @@
-"""A clockwork hall of rough metals, lacquer and polished stone: everything shows everything else."""
+"""A clockwork hall of rough metals, lacquer and polished stone: each shows all the others."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ def gear(teeth: int, thick: float, spokes: int, phase: float) -> Mesh:
 
 
 def meshing(teeth: int, at: Array, phase: float, other: int, angle: float) -> tuple[Array, float]:
-    """Place and phase of a gear of `other` teeth that meshes with one of `teeth`, at `angle` degrees."""
+    """Place and phase of a gear of `other` teeth that meshes with the one at `at`.
+
+    `angle` is the direction from one to the other, in degrees.
+    """
     distance = MODULE * (teeth + other) / 2
     place = at + distance * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
     # Teeth of one meet gaps of the other on the line between the centres.

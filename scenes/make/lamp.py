@@ -1,4 +1,4 @@
-"""A lamp whose glowing bead is shut in a bulb inside a ribbed globe: no straight line leads to it."""
+"""A lamp whose glowing bead is shut in a bulb in a ribbed globe: no straight line leads to it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WALNUT = [
 
 
 def globe() -> Mesh:
-    """The shade: a blown globe with ribs outside, smooth inside, open only where the fitting holds it."""
+    """The shade: a globe, ribbed outside and smooth inside, open where the fitting holds it."""
     radius, wall, neck, ribs = 0.092, 0.0045, 0.034, 20
     low = -np.degrees(np.arccos(neck / radius))
     outside = arc((0, GLOBE_Y), radius, low, 90, 24)
@@ -73,7 +73,7 @@ def fitting() -> Mesh:
 
 
 def vanity_mirror(tilt: float) -> tuple[Mesh, Mesh]:
-    """A round mirror in a frame on a stand: (silver, brass). It faces +z, `tilt` degrees upwards."""
+    """A round mirror in a frame on a stand: (silver, brass). It faces +z, `tilt` degrees up."""
     disc = lathe([(0, 0), (0.101, 0), (0.101, 0.004), (0, 0.004)], 72, crease=30).turned(
         "x", 90 - tilt
     )

@@ -65,7 +65,7 @@ class Mesh:
         return self.points[first], place.reshape(-1)
 
     def is_closed(self) -> bool:
-        """Whether every edge is met equally often in both directions, once coincident points are one."""
+        """Whether every edge is met as often in one direction as in the other, points welded."""
         _, place = self.welded()
         corners = place[self.indices]
         ends = np.cumsum(self.counts)
@@ -90,7 +90,7 @@ class Mesh:
         return Mesh(points, self.counts, place[self.indices])
 
     def smooth(self, crease: float = 40.0) -> Mesh:
-        """The mesh with shading normals, averaged over faces that meet at less than `crease` degrees.
+        """The mesh with shading normals, averaged over faces that meet at less than `crease` deg.
 
         Points on a crease are split, one for each smooth side.
         """

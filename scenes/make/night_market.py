@@ -1,4 +1,4 @@
-"""A market lane at night under some six hundred small lights, most of them hidden from any one spot."""
+"""A market lane at night under some six hundred small lights, most hidden from any one spot."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def basin() -> Mesh:
 
 
 def coping() -> Array:
-    """Centres of the stones around the edge, with a quarter turn for those along z: (x, z, turn)."""
+    """Places of the stones around the edge: (x, z, kind), 1 turned along z, 2 a corner."""
     stone = 0.46
     places = []
     for x in np.arange(-4, 4) * stone + stone / 2:
@@ -117,7 +117,7 @@ def agave_leaf() -> Mesh:
     rows = [
         np.tile(rows[0].mean(axis=0), (8, 1)),
         *rows,
-        np.tile(rows[-1].mean(axis=0) + [0.02, 0, 0], (8, 1)),
+        np.tile(rows[-1].mean(axis=0) + np.array([0.02, 0, 0]), (8, 1)),
     ]
     solid = loft(np.array(rows))
     return (solid if solid.volume() > 0 else solid.flipped()).smooth(60)

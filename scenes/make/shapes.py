@@ -162,7 +162,7 @@ def _edge_lines(core: float, round_off: Array, bevel: float) -> Array:
 
 
 def extrude(outline: ArrayLike, depth: float, bevel: float = 0.0) -> Mesh:
-    """A convex-enough outline (counter-clockwise in xy) as a plate between z = -depth/2 and depth/2.
+    """An outline in xy, counter-clockwise, as a plate between z = -depth/2 and depth/2.
 
     The caps are fans about the outline's mean point, which must see the whole outline.
     """
@@ -232,7 +232,7 @@ def height_field(x: ArrayLike, z: ArrayLike, height: Callable[[Array, Array], Ar
 def basin_body(
     x: ArrayLike, z: ArrayLike, height: Callable[[Array, Array], Array], floor: float
 ) -> Mesh:
-    """A closed body of liquid: a height field above, straight sides and a flat bottom at `floor`."""
+    """A closed body of liquid: a height field above, straight sides, a flat bottom at `floor`."""
     top = height_field(x, z, height)
     nx, nz = len(np.asarray(x)), len(np.asarray(z))
     grid = np.arange(nx * nz).reshape(nx, nz)

@@ -231,7 +231,7 @@ class Scene:
     ) -> None:
         """Many instances of (mesh, material) prototypes.
 
-        `kinds` are indices of prototypes; `turns` are quaternions (w, x, y, z); `scales` are uniform.
+        `kinds` are indices of prototypes, `turns` quaternions (w, x, y, z), `scales` uniform.
         """
         full = f"/World/Geometry/{path}"
         prim = UsdGeom.PointInstancer.Define(self.stage, full)

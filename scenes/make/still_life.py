@@ -1,4 +1,4 @@
-"""A studio still of plain shapes under two soft boxes: the easy one, where every method is quick."""
+"""A studio still of plain shapes under two soft boxes: the easy one, quick with any method."""
 
 from __future__ import annotations
 

@@ -1,12 +1,11 @@
-"""Procedural images: wood, tiles, plaster, cloth and skies. All tile, and all come from fixed seeds."""
+"""Procedural images: wood, tiles, plaster and skies. All tile, and come from fixed seeds."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
-from PIL import Image
+import OpenImageIO
 
 from .mesh import Array
 
@@ -123,26 +122,31 @@ def sky(
     return np.where(below, np.array(ground), air)
 
 
-def save_colour(folder: Path, name: str, image: Array, quality: int = 88) -> None:
+def save_colour(folder: Path, name: str, image: Array) -> None:
     """Writes an sRGB-encoded image as JPEG."""
-    data = np.round(np.clip(image, 0, 1) * 255).astype(np.uint8)
-    Image.fromarray(data).save(folder / f"{name}.jpg", quality=quality, optimize=True)
+    spec = OpenImageIO.ImageSpec(image.shape[1], image.shape[0], 3, OpenImageIO.UINT8)
+    spec.attribute("Compression", "jpeg:88")
+    spec.attribute("oiio:ColorSpace", "srgb_rec709_scene")
+    _write(folder / f"{name}.jpg", spec, np.clip(image, 0, 1))
 
 
-def save_data(folder: Path, name: str, image: Array) -> None:
+def save_data(folder: Path, name: str, field: Array) -> None:
     """Writes a scalar field as a grey PNG, which keeps its values as they are."""
-    data = np.round(np.clip(image, 0, 1) * 255).astype(np.uint8)
-    Image.fromarray(data, mode="L").save(folder / f"{name}.png", optimize=True)
+    spec = OpenImageIO.ImageSpec(field.shape[1], field.shape[0], 1, OpenImageIO.UINT8)
+    _write(folder / f"{name}.png", spec, np.clip(field, 0, 1)[..., None])
 
 
 def save_radiance(folder: Path, name: str, image: Array) -> None:
     """Writes linear radiance as a half-float OpenEXR file."""
-    height, width, channels = image.shape
-    spec = oiio.ImageSpec(width, height, channels, oiio.HALF)
+    spec = OpenImageIO.ImageSpec(image.shape[1], image.shape[0], 3, OpenImageIO.HALF)
     spec.attribute("compression", "zip")
-    path = str(folder / f"{name}.exr")
-    out = oiio.ImageOutput.create(path)
-    if out is None or not out.open(path, spec):
-        raise OSError(f"cannot write {path}: {oiio.geterror()}")
-    out.write_image(np.ascontiguousarray(image, np.float32))
+    _write(folder / f"{name}.exr", spec, image)
+
+
+def _write(path: Path, spec: OpenImageIO.ImageSpec, image: Array) -> None:
+    out = OpenImageIO.ImageOutput.create(str(path))
+    if out is None or not out.open(str(path), spec):
+        raise OSError(f"cannot write {path}: {OpenImageIO.geterror()}")
+    if not out.write_image(np.ascontiguousarray(image, np.float32)):
+        raise OSError(f"cannot write {path}: {out.geterror()}")
     out.close()

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+import segue
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 from pxr import Usd, UsdGeom, UsdLux, UsdRender, UsdShade, UsdValidation
@@ -152,3 +156,39 @@ def test_textures_are_small() -> None:
     assert sum(image.stat().st_size for image in images) <= 3_000_000
     text = "".join(path.read_text() for path in STAGES)
     assert [image.name for image in images if f"@./textures/{image.name}@" not in text] == []
+
+
+@pytest.mark.parametrize("path", STAGES, ids=lambda path: path.stem)
+def test_generator_makes_what_is_committed(path: Path, tmp_path: Path, monkeypatch) -> None:
+    """The committed stage has the prims and the shapes of the one its generator makes now."""
+    pytest.importorskip("OpenImageIO", reason="the generator writes images with OpenImageIO")
+    monkeypatch.setattr(sys, "path", [str(FOLDER), *sys.path])
+    made = importlib.import_module(f"make.{path.stem}").build(tmp_path).stage
+    committed = Usd.Stage.Open(str(path))
+    names = [str(p.GetPath()) for p in committed.TraverseAll()]
+    assert [str(p.GetPath()) for p in made.TraverseAll()] == names
+    # Shading normals are split by an angle, so only the shape is compared, not every number.
+    for ours, theirs in zip(meshes(made), meshes(committed), strict=True):
+        assert np.allclose(ours.GetExtentAttr().Get(), theirs.GetExtentAttr().Get(), atol=2e-4)
+        assert len(ours.GetFaceVertexCountsAttr().Get()) == len(
+            theirs.GetFaceVertexCountsAttr().Get()
+        )
+
+
+@pytest.mark.parametrize("path", STAGES, ids=lambda path: path.stem)
+def test_renders(path: Path, engine: Path) -> None:
+    """Segue takes the whole stage, and a small picture of it is finite and shows something."""
+    from segue import usd
+
+    loaded = usd.load(path)
+    assert [str(entry) for entry in loaded.report.entries] == []
+    settings = {**loaded.settings(), "resolution": [64, 36], "samples": 4, "max_depth": 6}
+    render = segue.Render(loaded.scene, settings)
+    assert render.run()
+    picture = render.read_pass("Combined")[..., :3]
+    stats = render.stats()
+    assert stats["warnings"] == [] and stats["non_finite"] == 0
+    assert np.isfinite(picture).all()
+    assert picture.min() >= 0.0
+    lit = (picture.max(axis=2) > 1e-3).mean()
+    assert lit > 0.1, f"only {lit:.0%} of the picture is lit"
