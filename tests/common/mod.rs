@@ -95,7 +95,10 @@ impl Stage {
     /// A camera at `eye` that looks at `target`; `more` are further JSON keys, each with a leading comma.
     pub fn camera(&mut self, eye: DVec3, target: DVec3, half_window: f64, more: &str) {
         let up = if (target - eye).normalize().z.abs() > 0.9 { DVec3::Y } else { DVec3::Z };
-        let m = matrix(DMat4::look_at_rh(eye, target, up).inverse());
+        let z = (eye - target).normalize();
+        let x = up.cross(z).normalize();
+        let m =
+            matrix(DMat4::from_cols(x.extend(0.0), z.cross(x).extend(0.0), z.extend(0.0), eye.extend(1.0)));
         let json =
             format!(r#"{{"transform":{m:?},"window":[{0},{1},{0},{1}]{more}}}"#, -half_window, half_window);
         self.0.set_camera("camera", &json).unwrap();
