@@ -41,6 +41,8 @@ pub struct Sampler {
     seed: u32,
     index: u32,
     dimension: u32,
+    /// Numbers of the current four dimensions: the sequence is computed four at a time.
+    four: [f32; 4],
 }
 
 impl Sampler {
@@ -48,7 +50,8 @@ impl Sampler {
     /// `stream` or `seed` are independent.
     pub fn new(seed: u32, stream: u32, index: u32) -> Self {
         let seed = hash(hash(seed, 0x5e9e), stream);
-        Self { seed: hash(seed, index / SOBOL_LENGTH), index: index % SOBOL_LENGTH, dimension: 0 }
+        let (seed, index) = (hash(seed, index / SOBOL_LENGTH), index % SOBOL_LENGTH);
+        Self { seed, index, dimension: 0, four: [0.0; 4] }
     }
 
     /// Next number in [0,1).
@@ -57,7 +60,10 @@ impl Sampler {
         let d = self.dimension;
         self.dimension += 1;
         if d < SOBOL_DIMENSIONS {
-            sobol_burley::sample(self.index, d, self.seed)
+            if d % 4 == 0 {
+                self.four = sobol_burley::sample_4d(self.index, d / 4, self.seed);
+            }
+            self.four[d as usize % 4]
         } else {
             unit(hash(hash(self.seed, d), self.index))
         }

@@ -62,7 +62,7 @@ impl Default for Json {
             transform: DMat4::IDENTITY.to_cols_array(),
             window: None,
             near: 0.0,
-            far: f64::INFINITY,
+            far: 1e30,
             aperture_radius: 0.0,
             focus_distance: 1.0,
             blades: 0,

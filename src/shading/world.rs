@@ -330,8 +330,8 @@ impl World {
         from_camera: bool,
         mut found: impl FnMut(LightPoint),
     ) {
-        // a ray that the camera's far plane ends does not see what is behind
-        if !self.needs.infinite_lights || piece.ray.t_max < f32::INFINITY {
+        // the far plane hides objects, not the sky behind them
+        if !self.needs.infinite_lights {
             return;
         }
         let direction = piece.direction;
