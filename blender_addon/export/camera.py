@@ -65,6 +65,7 @@ def camera_json(
     pixel_aspect: tuple[float, float],
     shift_x: float,
     extent: Extent,
+    world_visible: bool,
     log: ExportLog,
 ) -> dict[str, Any]:
     """The camera object of the ABI; `matrix` is camera to world without scale."""
@@ -81,10 +82,16 @@ def camera_json(
         "window": camera_window(camera, resolution, pixel_aspect, shift_x),
         "near": camera.clip_start,
     }
-    # The world is seen behind Blender's far plane; so one that cuts nothing is not passed on.
+    # Blender shows the world behind the far plane, Segue nothing: so the plane is passed
+    # on only where it cuts something and there is no world to be seen.
     view = np.array(matrix)
     if extent.farthest(view[:3, 3], -view[:3, 2]) > camera.clip_end:
-        result["far"] = camera.clip_end
+        if world_visible:
+            log.warn(
+                f"Camera '{camera_object.name}': the clip end is ignored, it would hide the world"
+            )
+        else:
+            result["far"] = camera.clip_end
     dof = camera.dof
     if dof.use_dof:
         stop = max(dof.aperture_fstop, 1e-5)
@@ -96,7 +103,8 @@ def camera_json(
             result["aperture_radius"] = 0.5 * lens / stop
             result["focus_distance"] = distance
             result["blades"] = dof.aperture_blades if dof.aperture_blades >= 3 else 0
-            result["blade_rotation"] = dof.aperture_rotation
+            # Blender's first corner points to the left, Segue's to the right.
+            result["blade_rotation"] = dof.aperture_rotation + math.pi
             result["aperture_ratio"] = dof.aperture_ratio
         else:
             name = camera_object.name
@@ -122,6 +130,7 @@ def export_camera(
         (render.pixel_aspect_x, render.pixel_aspect_y),
         engine.camera_shift_x(camera),
         exporter.extent,
+        exporter.world_visible,
         log,
     )
     exporter.scene.set_camera(camera.name, data)

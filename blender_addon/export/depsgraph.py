@@ -29,6 +29,7 @@ class Exporter:
     ) -> None:
         self.scene = segue.Scene()
         self.extent = Extent()
+        self.world_visible = False
         self._segue = segue
         self._depsgraph = depsgraph
         self._log = log
@@ -53,7 +54,7 @@ class Exporter:
                 return False
             self._add_group(group, materials, found)
         self._add_lights(found)
-        export_world(self.scene, self._depsgraph, self._translator, self._log)
+        self.world_visible = export_world(self.scene, self._depsgraph, self._translator, self._log)
         return True
 
     def _add_group(self, group: Group, materials: list[int], found: Survey) -> None:

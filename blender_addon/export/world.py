@@ -62,12 +62,14 @@ def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> lis
 
 def export_world(
     scene: Any, depsgraph: bpy.types.Depsgraph, translator: Translator, log: ExportLog
-) -> None:
-    """Add the world of the view layer, if it shines."""
+) -> bool:
+    """Add the world of the view layer, if it shines; whether the camera sees it."""
     view_layer = depsgraph.view_layer_eval
     if not view_layer.use_sky:
-        return
+        return False
     world = getattr(view_layer, "world_override", None) or depsgraph.scene_eval.world
     data = world_json(world, translator, log)
-    if data is not None:
-        scene.add_light(world.name, data)
+    if data is None:
+        return False
+    scene.add_light(world.name, data)
+    return data["camera_visible"]

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from .evaluate import Evaluator
+from .fresnel import fresnel_ior, layered
 from .tree import Stack, is_linked, resolve, socket
 from .values import KINDS, Constant, ImageValue, convert
 
@@ -146,6 +147,12 @@ class ClosureTranslator:
         return self._shader(node, shader, source.stack)
 
     def _mix(self, node: bpy.types.Node, stack: Stack) -> Closure:
+        ior = fresnel_ior(self.ev, resolve(node.inputs[0], stack))
+        if ior is not None:
+            parts = [self.closure(entry, stack) for entry in node.inputs[1:]]
+            surface = layered(self.ev, node, ior, *parts)
+            if surface is not None:
+                return surface
         factor = self.ev.value(node.inputs[0], stack)
         if isinstance(factor, Constant):
             share = min(max(factor.rgb[0], 0.0), 1.0)
@@ -253,8 +260,10 @@ class ClosureTranslator:
         if space is None or not isinstance(value, ImageValue) or value.channel != "rgb":
             self.ev.warn(node, "a normal map of this kind", "the surface's own normal is used")
             return None
+        # DirectX's green points down; the choice is new in Blender 5.1.
+        up = -1.0 if getattr(node, "convention", "OPENGL") == "DIRECTX" else 1.0
         return {
-            "texture": self.ev.textures.texture(value, scale=2.0, bias=-1.0),
+            "texture": self.ev.textures.texture(value, (2.0, 2.0 * up, 2.0), (-1.0, -up, -1.0)),
             "strength": self.ev.textures.json(
                 self.ev.value(node.inputs["Strength"], stack), "float"
             ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -69,9 +70,12 @@ class TextureStore:
         return self._images[id(source)][1]
 
     def texture(
-        self, value: ImageValue | AttributeValue, scale: float = 1.0, bias: float = 0.0
+        self,
+        value: ImageValue | AttributeValue,
+        scale: Sequence[float] = (1.0, 1.0, 1.0),
+        bias: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> int:
-        """Id of the texture that yields `scale * value + bias`."""
+        """Id of the texture that yields `scale * value + bias`; an attribute is never scaled."""
         if isinstance(value, AttributeValue):
             self.attributes.add(value.name)
             name = value.name
@@ -82,7 +86,7 @@ class TextureStore:
             }
         else:
             sampling = value.sampling
-            scale *= value.gain
+            scale = [factor * value.gain for factor in scale]
             if sampling.uv:
                 self.attributes.add(sampling.uv)
             name = value.source.name
@@ -95,9 +99,8 @@ class TextureStore:
                 "wrap_t": sampling.wrap,
                 "filter": sampling.filter,
             }
-            if (scale, bias) != (1.0, 0.0):
-                data["scale"] = [scale, scale, scale, 1.0]
-                data["bias"] = [bias, bias, bias, 0.0]
+            data["scale"] = [*scale, 1.0]
+            data["bias"] = [*bias, 0.0]
         key = json.dumps(data, sort_keys=True)
         if key not in self._textures:
             self._textures[key] = self._scene.add_texture(name, data)

@@ -75,6 +75,10 @@ def case_clipping() -> None:
     item.data.clip_end = 4.5
     scene, _ = builders.export()
     assert scene.camera[1]["far"] == 4.5
+    builders.world()
+    scene, warnings = builders.export()
+    assert "far" not in scene.camera[1]
+    assert any("clip end" in text for text in warnings)
 
 
 def case_depth_of_field() -> None:
@@ -92,7 +96,7 @@ def case_depth_of_field() -> None:
     assert math.isclose(found["aperture_radius"], 0.0125, rel_tol=1e-5)
     assert math.isclose(found["focus_distance"], 4.0)
     assert (found["blades"], found["aperture_ratio"]) == (6, 2.0)
-    assert math.isclose(found["blade_rotation"], 0.5)
+    assert math.isclose(found["blade_rotation"], 0.5 + math.pi, rel_tol=1e-6)
     # An object in focus counts by its depth, not by its distance.
     dof.focus_object = builders.link(None, "Focus", Matrix.Translation((3, 0, -1)))
     scene, _ = builders.export()

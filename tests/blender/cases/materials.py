@@ -171,6 +171,34 @@ def case_mix_and_add() -> None:
     assert tree.export()[0]["type"] == "add"
 
 
+def case_fresnel_mixes_are_layers() -> None:
+    tree = Tree()
+    mix, fresnel = tree.surface(tree.node("MixShader")), tree.node("Fresnel", IOR=1.4)
+    refraction = tree.node("BsdfRefraction", Color=(0.9, 0.8, 0.7, 1), IOR=1.4, Roughness=0.1)
+    refraction.distribution = "GGX"
+    glossy = tree.node("BsdfAnisotropic", Color=(0.9, 0.8, 0.7, 1), Roughness=0.1)
+    tree.link(fresnel.outputs[0], mix.inputs[0])
+    tree.link(refraction.outputs[0], mix.inputs[1])
+    tree.link(glossy.outputs[0], mix.inputs[2])
+    surface, _, warnings = tree.export()
+    assert surface["type"] == "glass" and not warnings, warnings
+    _close((surface["ior"], surface["roughness"]), (1.4, 0.1))
+    glossy.inputs["Roughness"].default_value = 0.3
+    assert any("unequal" in text for text in tree.export()[2])
+    # Diffuse below a varnish, by the Layer Weight node this time.
+    weight, diffuse = tree.node("LayerWeight", Blend=0.2), tree.node("BsdfDiffuse")
+    tree.link(weight.outputs["Fresnel"], mix.inputs[0])
+    tree.link(diffuse.outputs[0], mix.inputs[1])
+    surface, _, warnings = tree.export()
+    assert surface["type"] == "principled" and not warnings, warnings
+    _close((surface["ior"], surface["roughness"]), (1.25, 0.3))
+    _close(surface["specular_tint"], (0.9, 0.8, 0.7))
+    # Any other pair keeps the plain mix, with a constant factor that is named.
+    tree.link(tree.node("Emission").outputs[0], mix.inputs[2])
+    surface, _, warnings = tree.export()
+    assert surface["type"] == "mix" and len(warnings) == 1, warnings
+
+
 def case_reroutes_mutes_and_groups() -> None:
     group = bpy.data.node_groups.new("Paint", "ShaderNodeTree")
     group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
@@ -306,6 +334,11 @@ def case_normal_map() -> None:
     assert (found["space"], found["uv"]) == ("tangent", "UVMap") and not warnings
     texture = scene.textures[found["texture"]][1]
     assert texture["scale"][:3] == [2.0] * 3 and texture["bias"][:3] == [-1.0] * 3
+    if hasattr(normal, "convention"):
+        normal.convention = "DIRECTX"
+        surface, scene, _ = tree.export()
+        texture = scene.textures[surface["normal"]["texture"]][1]
+        assert (texture["scale"][:3], texture["bias"][:3]) == ([2.0, -2.0, 2.0], [-1.0, 1.0, -1.0])
     bump = tree.node("Bump")
     tree.link(normal.outputs[0], bump.inputs["Normal"])
     tree.link(bump.outputs[0], diffuse.inputs["Normal"])
