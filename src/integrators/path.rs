@@ -180,7 +180,7 @@ impl PathWalk<'_, '_> {
                 // by basic radiance: a path inside glass is not worth less than outside
                 let ceiling = if depth >= ROULETTE_ALWAYS_FROM { MAX_SURVIVAL } else { 1.0 };
                 let survival = throughput.weight.max_element().min(ceiling);
-                if !(u < survival) {
+                if u >= survival {
                     return;
                 }
                 throughput.weight /= survival;

@@ -8,7 +8,7 @@ pub fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.212_671, 0.715_16, 0.072_169))
 }
 
-/// Decodes one sRGB-encoded component to linear light (IEC 61966-2-1). Values outside [0,1] follow
+/// Decodes one sRGB-encoded component to linear light (IEC 61966-2-1). Values outside `[0,1]` follow
 /// the same curve, mirrored at zero.
 pub fn srgb_to_linear(v: f32) -> f32 {
     let a = v.abs();

@@ -32,8 +32,7 @@ impl Frame {
         let t = tangent.normalize_or_zero();
         let s = t - n * n.dot(t);
         let len2 = s.length_squared();
-        // `!(a > b)` also catches NaN
-        if !(len2 > 1e-8) {
+        if len2.is_nan() || len2 <= 1e-8 {
             return Self::from_normal(n);
         }
         let s = s / len2.sqrt();

@@ -110,7 +110,8 @@ impl Camera {
             true => Ok(v as f32),
             false => Err(fail(format!("{what} is {v}, it must be positive and finite"))),
         };
-        if !(j.near >= 0.0 || j.projection == Projection::Orthographic) || !(j.far > j.near) {
+        let behind = j.near < 0.0 && j.projection == Projection::Perspective;
+        if behind || j.near.is_nan() || j.far.is_nan() || j.far <= j.near {
             return Err(fail(format!("the clipping range {}..{} is empty", j.near, j.far)));
         }
         if !(j.aperture_radius >= 0.0 && j.aperture_radius.is_finite()) {

@@ -98,7 +98,7 @@ pub enum NormalSpace {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NormalMap {
-    /// Texture whose colour is the normal in [-1,1].
+    /// Texture whose colour is the normal in `[-1,1]`.
     pub texture: u32,
     /// 0 leaves the surface's normal, 1 takes the map's.
     #[serde(default = "one")]

@@ -128,7 +128,7 @@ impl Mesh {
                 }
                 counts.len()
             }
-            None if input.face_indices.len() % 3 != 0 => {
+            None if !input.face_indices.len().is_multiple_of(3) => {
                 return Err(fail(format!(
                     "{} corner indices do not make triangles",
                     input.face_indices.len()

@@ -4,7 +4,7 @@ use super::SceneError;
 use glam::{Affine2, Mat2, Vec2, Vec4};
 use serde::Deserialize;
 
-/// What lies outside [0,1] of an image's coordinates.
+/// What lies outside `[0,1]` of an image's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {

@@ -41,7 +41,7 @@ pub enum SessionError {
 /// How far a render is.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Progress {
-    /// Share of the work that is done, in [0,1], by the nearest limit.
+    /// Share of the work that is done, in `[0,1]`, by the nearest limit.
     pub fraction: f64,
     /// Seconds of rendering so far.
     pub seconds: f64,

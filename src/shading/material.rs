@@ -34,12 +34,12 @@ impl Materials {
         self.transparent[material as usize]
     }
 
-    /// Share of the surface that is there; in [0,1].
+    /// Share of the surface that is there; in `[0,1]`.
     pub fn opacity(&self, material: u32, at: &MeshPoint) -> f32 {
         self.textures.number(&self.scene.materials[material as usize].opacity, at).clamp(0.0, 1.0)
     }
 
-    /// Share of light that passes straight through; in [0,1] a channel.
+    /// Share of light that passes straight through; in `[0,1]` a channel.
     pub fn transparency(&self, material: u32, at: &MeshPoint) -> Vec3 {
         let opacity = self.opacity(material, at);
         let through = self.straight(&self.scene.materials[material as usize].surface, at);

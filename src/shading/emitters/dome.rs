@@ -92,7 +92,7 @@ pub(super) fn direction_of(at: Vec2) -> Vec3 {
     Vec3::new(sin * x, cos, sin * z)
 }
 
-/// Point of a lat-long image in [0,1] x [0,1], y downwards, of a direction.
+/// Point of a lat-long image in `[0,1] x [0,1]`, y downwards, of a direction.
 pub(super) fn image_of(d: Vec3) -> Vec2 {
     let u = 0.5 - d.x.atan2(d.z) / TAU;
     let v = d.x.hypot(d.z).atan2(d.y) / PI;

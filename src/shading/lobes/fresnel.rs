@@ -86,7 +86,7 @@ impl Fresnel {
         Self::F82 { f0, b: schlick * (Vec3::ONE - tint) / (MU * (1.0 - MU).powi(6)) }
     }
 
-    /// Reflectance at the cosine `mu` in [0,1].
+    /// Reflectance at the cosine `mu` in `[0,1]`.
     #[inline]
     pub fn eval(&self, mu: f32) -> Vec3 {
         let x = (1.0 - mu).clamp(0.0, 1.0);
