@@ -6,6 +6,8 @@ import pytest
 
 pytest.importorskip("pxr")
 
+from pxr import Usd
+
 from segue import usd
 from stages import QUAD, load, reported
 
@@ -384,3 +386,21 @@ def test_one_description_is_one_material():
     )
     assert len(scene.materials) == 1
     assert len(scene.instances) == 5
+
+
+@pytest.mark.parametrize("space", ["lin_rec709_scene", "lin_ap1_scene"])
+def test_colors_of_another_space_are_said(space):
+    if not hasattr(Usd, "ColorSpaceAPI"):
+        pytest.skip("this USD has no ColorSpaceAPI")
+    body = MESH + preview(LAMBERT)
+    body = body.replace(
+        'def Material "Look" {',
+        'def Material "Look" (\nprepend apiSchemas = ["ColorSpaceAPI"]\n) {\n'
+        f'uniform token colorSpace:name = "{space}"',
+    )
+    _, imported = load(body)
+    said = reported(imported, usd.Kind.UNSUPPORTED)
+    if space == "lin_ap1_scene":
+        assert said == [("/Look/S", "colours in the space 'lin_ap1_scene'")]
+    else:
+        assert said == []

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ._pxr import Gf, Usd, UsdGeom, UsdRender
+from ._pxr import Gf, Sdf, Usd, UsdGeom, UsdRender
 from .report import Report
 from .transform import column_matrix, flat, without_scale
 
@@ -77,25 +77,39 @@ def find_camera(
     Raises:
         LookupError: the camera that was asked for does not exist.
     """
-    cameras = [
-        p
-        for p in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
-        if p.IsA(UsdGeom.Camera)
-    ]
     if wanted:
-        for prim in cameras:
-            if wanted in (str(prim.GetPath()), prim.GetName()):
-                return prim
-        known = ", ".join(str(p.GetPath()) for p in cameras) or "none"
-        raise LookupError(f"there is no camera {wanted}; the stage's cameras: {known}")
+        return _named_camera(stage, wanted)
     if settings.camera:
         prim = stage.GetPrimAtPath(settings.camera)
         if prim and prim.IsA(UsdGeom.Camera):
             return prim
         report.warning("", f"the render settings name the camera {settings.camera}", "not found")
+    cameras = _cameras(stage)
     if len(cameras) > 1:
         report.note(cameras[0], f"the stage has {len(cameras)} cameras", "the first one is used")
     return cameras[0] if cameras else None
+
+
+def _cameras(stage: Usd.Stage) -> list[Usd.Prim]:
+    """The stage's cameras; those inside instances only where there are no others."""
+    found = [p for p in stage.Traverse() if p.IsA(UsdGeom.Camera)]
+    if found:
+        return found
+    proxies = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+    return [p for p in stage.Traverse(proxies) if p.IsA(UsdGeom.Camera)]
+
+
+def _named_camera(stage: Usd.Stage, wanted: str) -> Usd.Prim:
+    if Sdf.Path.IsValidPathString(wanted) and wanted.startswith("/"):
+        prim = stage.GetPrimAtPath(wanted)
+        if prim and prim.IsA(UsdGeom.Camera):
+            return prim
+    cameras = _cameras(stage)
+    for prim in cameras:
+        if prim.GetName() == wanted:
+            return prim
+    known = ", ".join(str(p.GetPath()) for p in cameras) or "none"
+    raise LookupError(f"there is no camera {wanted}; the stage's cameras: {known}")
 
 
 def conform(

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..scene import Scene
 from ._pxr import Tf, Usd, UsdGeom, UsdLux
+from .color_space import check_color_space
 from .report import Report
 from .texture import Textures
 from .transform import flat, is_invertible, without_scale
@@ -154,6 +155,7 @@ class Lights:
     def check(self, prim: Usd.Prim) -> None:
         """Reports what a light asks for and does not get."""
         light, time, report = UsdLux.LightAPI(prim), self._time, self._report
+        check_color_space(prim, report)
         for name, attribute in (
             ("diffuse", light.GetDiffuseAttr()),
             ("specular", light.GetSpecularAttr()),

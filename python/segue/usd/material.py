@@ -7,6 +7,7 @@ from typing import Any
 
 from ..scene import Scene
 from ._pxr import Sdf, Usd, UsdShade
+from .color_space import check_color_space
 from .report import Report
 from .texture import COLOR_READERS, Textures, floats, source
 
@@ -204,6 +205,7 @@ def read_surface(
             if what == "displacement" and source(node, what, time) in (None, 0.0):
                 continue
             report.unsupported(prim, what, "it is ignored")
+    check_color_space(node.GetPrim(), report)
     return _surface(_Inputs(node, textures, time, report), report)
 
 

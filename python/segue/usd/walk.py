@@ -18,8 +18,6 @@ from .instancer import instance_transforms
 from .report import Report
 from .transform import column_matrix, compose, local_matrix
 
-_IDENTITY = np.eye(4)[None]
-
 
 @dataclass(frozen=True)
 class Item:
@@ -35,12 +33,6 @@ class Item:
     transforms: np.ndarray
     absolute: bool = False
 
-    def placed(self, outer: np.ndarray) -> Item:
-        """The item below instances with the given transformations."""
-        if self.absolute:
-            return self
-        return Item(self.prim, compose(outer, self.transforms), False)
-
 
 @dataclass(frozen=True)
 class _State:
@@ -50,6 +42,42 @@ class _State:
     absolute: bool = False
     purpose: str = "default"
     purpose_inherits: bool = False
+
+
+class _Scope:
+    """What is found below one root: the stage's, or a prototype's.
+
+    Instances are collected by prototype and multiplied out when the scope is closed, all those of
+    a prototype at once.
+    """
+
+    def __init__(self) -> None:
+        self._items: list[Item] = []
+        self._placed: dict[tuple, tuple[list[Item], list[np.ndarray]]] = {}
+
+    def add(self, prim: Usd.Prim, state: _State) -> None:
+        """A drawn prim."""
+        self._items.append(Item(prim, column_matrix(state.matrix)[None], state.absolute))
+
+    def place(self, key: Any, items: list[Item], outer: np.ndarray, absolute: bool) -> None:
+        """Instances of a prototype with the given (n, 4, 4) transformations."""
+        self._placed.setdefault((key, absolute), (items, []))[1].append(outer)
+
+    def close(self) -> list[Item]:
+        """All items, those of one prim together."""
+        found = list(self._items)
+        for (_, absolute), (items, matrices) in self._placed.items():
+            outer = np.concatenate(matrices)
+            for item in items:
+                transforms = item.transforms if item.absolute else compose(outer, item.transforms)
+                found.append(Item(item.prim, transforms, item.absolute or absolute))
+        merged: dict[tuple, list[Item]] = {}
+        for item in found:
+            merged.setdefault((item.prim.GetPath(), item.absolute), []).append(item)
+        return [
+            Item(same[0].prim, np.concatenate([i.transforms for i in same]), same[0].absolute)
+            for same in merged.values()
+        ]
 
 
 class Walker:
@@ -68,42 +96,50 @@ class Walker:
 
     def items(self) -> list[Item]:
         """The drawn prims, each once, with all its transformations, in stage order."""
-        found: list[Item] = []
         predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
         root = self._stage.GetPseudoRoot()
-        for prim in root.GetFilteredChildren(predicate):
-            self._visit(prim, _State(Gf.Matrix4d(1)), predicate, found)
-        merged: dict[tuple, list[Item]] = {}
-        for item in found:
-            merged.setdefault((item.prim.GetPath(), item.absolute), []).append(item)
-        return [
-            Item(same[0].prim, np.concatenate([i.transforms for i in same]), same[0].absolute)
-            for same in merged.values()
-        ]
+        return self._walk(root.GetFilteredChildren(predicate), _State(Gf.Matrix4d(1)), predicate)
 
-    def _visit(self, prim: Usd.Prim, state: _State, predicate: Any, found: list[Item]) -> None:
+    def _walk(self, roots: Iterable[Usd.Prim], state: _State, predicate: Any) -> list[Item]:
+        """Everything drawn at and below the roots."""
+        scope = _Scope()
+        stack = [(prim, state) for prim in reversed(list(roots))]
+        while stack:
+            prim, inherited = stack.pop()
+            own = self._own_state(prim, inherited)
+            if own is None:
+                continue
+            if prim.IsInstance():
+                self._instance(prim, own, predicate, scope)
+                continue
+            if prim.IsA(UsdGeom.PointInstancer):
+                if self._is_drawn(prim, own):
+                    self._point_instancer(prim, own, scope)
+                continue
+            if _is_drawable(prim) and self._is_drawn(prim, own):
+                scope.add(prim, own)
+            children = prim.GetFilteredChildren(predicate)
+            stack.extend((child, own) for child in reversed(children))
+        return scope.close()
+
+    def _own_state(self, prim: Usd.Prim, state: _State) -> _State | None:
+        """What holds at a prim and below it; None if it is invisible."""
         imageable = UsdGeom.Imageable(prim)
         if imageable:
             if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
                 self._report.left_out(prim, "invisible")
-                return
+                return None
             state = self._with_purpose(imageable, state)
         xformable = UsdGeom.Xformable(prim)
-        if xformable:
-            own, reset = local_matrix(xformable, self._time)
-            matrix = own if reset else own * state.matrix
-            state = _State(matrix, reset or state.absolute, state.purpose, state.purpose_inherits)
-        if prim.IsInstance():
-            self._instance(prim, state, predicate, found)
-            return
-        if prim.IsA(UsdGeom.PointInstancer):
-            if self._is_drawn(prim, state):
-                self._point_instancer(prim, state, found)
-            return
-        if _is_drawable(prim) and self._is_drawn(prim, state):
-            found.append(Item(prim, column_matrix(state.matrix)[None], state.absolute))
-        for child in prim.GetFilteredChildren(predicate):
-            self._visit(child, state, predicate, found)
+        if not xformable:
+            return state
+        own, reset = local_matrix(xformable, self._time)
+        return _State(
+            own if reset else own * state.matrix,
+            reset or state.absolute,
+            state.purpose,
+            state.purpose_inherits,
+        )
 
     def _with_purpose(self, imageable: UsdGeom.Imageable, state: _State) -> _State:
         """UsdGeomImageable's rule: an authored purpose holds for the prim and what is below."""
@@ -120,21 +156,20 @@ class Walker:
         self._report.left_out(prim, f"of purpose '{state.purpose}'")
         return False
 
-    def _instance(self, prim: Usd.Prim, state: _State, predicate: Any, found: list[Item]) -> None:
+    def _instance(self, prim: Usd.Prim, state: _State, predicate: Any, scope: _Scope) -> None:
         key = (
             prim.GetPrototype().GetPath(),
             state.purpose,
             state.purpose_inherits,
             self._inherited_by(prim),
         )
-        items = self._prototypes.get(key)
-        if items is None:
-            items = []
+        if key not in self._prototypes:
             inner = _State(Gf.Matrix4d(1), False, state.purpose, state.purpose_inherits)
-            for child in prim.GetFilteredChildren(predicate):
-                self._visit(child, inner, predicate, items)
-            self._prototypes[key] = items
-        self._place(items, column_matrix(state.matrix)[None], state.absolute, found)
+            self._prototypes[key] = self._walk(
+                prim.GetFilteredChildren(predicate), inner, predicate
+            )
+        outer = column_matrix(state.matrix)[None]
+        scope.place(key, self._prototypes[key], outer, state.absolute)
 
     def _inherited_by(self, prim: Usd.Prim) -> tuple:
         """What the prims of an instance may inherit from above it: bindings and primvars.
@@ -164,7 +199,7 @@ class Walker:
         self._inherited[path] = result
         return result
 
-    def _point_instancer(self, prim: Usd.Prim, state: _State, found: list[Item]) -> None:
+    def _point_instancer(self, prim: Usd.Prim, state: _State, scope: _Scope) -> None:
         groups = instance_transforms(UsdGeom.PointInstancer(prim), self._time, self._report)
         # A prototype is drawn wherever it is defined: below an `over`, a class, or the instancer.
         predicate = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
@@ -175,25 +210,15 @@ class Walker:
                     prim, f"the prototype {path} holds its own instancer", "left out"
                 )
                 continue
-            root = self._stage.GetPrimAtPath(path)
             key = (path, state.purpose, state.purpose_inherits)
-            items = self._prototypes.get(key)
-            if items is None:
-                items = []
+            if key not in self._prototypes:
                 inner = _State(Gf.Matrix4d(1), False, state.purpose, state.purpose_inherits)
                 self._open.append(path)
-                self._visit(root, inner, predicate, items)
+                items = self._walk([self._stage.GetPrimAtPath(path)], inner, predicate)
                 self._open.pop()
                 # Resetting the stack inside a prototype goes no further than the prototype.
-                items = [Item(i.prim, i.transforms, False) for i in items]
-                self._prototypes[key] = items
-            self._place(items, compose(outer, transforms), state.absolute, found)
-
-    @staticmethod
-    def _place(items: list[Item], outer: np.ndarray, absolute: bool, found: list[Item]) -> None:
-        for item in items:
-            placed = item.placed(outer)
-            found.append(Item(placed.prim, placed.transforms, placed.absolute or absolute))
+                self._prototypes[key] = [Item(i.prim, i.transforms) for i in items]
+            scope.place(key, self._prototypes[key], compose(outer, transforms), state.absolute)
 
 
 def _is_drawable(prim: Usd.Prim) -> bool:
