@@ -1,12 +1,12 @@
 //! Materials at a surface point: the tree of closures becomes a BSDF, an emission and a transparency.
 
-use super::bsdf::{Bsdf, BsdfBuilder};
-use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, Reflection};
+use super::bsdf::{Bsdf, BsdfBuilder, MetalF90, Principled};
+use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen, Translucent};
 use super::surface::{SurfacePoint, normal_matrix, normalize_any};
 use super::texture::{MeshPoint, TextureSet};
 use crate::math::Frame;
 use crate::scene::Scene;
-use crate::scene::material::{Closure, NormalMap, NormalSpace, PrincipledClosure, Value};
+use crate::scene::material::{Closure, MetalEdge, NormalMap, NormalSpace, PrincipledClosure, Value};
 use crate::scene::needs::may_be_transparent;
 use glam::{Mat3, Vec3};
 use std::f32::consts::TAU;
@@ -85,24 +85,33 @@ impl Materials {
     }
 
     /// The scattering at a point. Transparent closures are not in it: they belong to visibility.
-    pub fn bsdf(&self, p: &SurfacePoint) -> Bsdf {
+    /// `wo`: the direction it is seen from, which decides how much the layers of a principled surface hide
+    /// of each other.
+    pub fn bsdf(&self, p: &SurfacePoint, wo: Vec3) -> Bsdf {
         let mut builder = BsdfBuilder::new(p.place.normal);
-        self.push(&mut builder, &self.scene.materials[p.material as usize].surface, Vec3::ONE, p);
+        self.push(&mut builder, &self.scene.materials[p.material as usize].surface, Vec3::ONE, p, wo);
         builder.build()
     }
 
-    fn push(&self, builder: &mut BsdfBuilder, closure: &Closure, weight: Vec3, p: &SurfacePoint) {
+    fn push(&self, builder: &mut BsdfBuilder, closure: &Closure, weight: Vec3, p: &SurfacePoint, wo: Vec3) {
         let color = |v: &Value| self.textures.color(v, &p.at).max(Vec3::ZERO);
         let number = |v: &Value| self.textures.number(v, &p.at);
         let frame = |n: &Option<NormalMap>| self.frame(n.as_ref(), p);
         match closure {
             Closure::Diffuse { color: c, roughness, normal } => {
-                let _ = roughness;
-                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Lambert(Lambert));
+                let (c, sigma) = (color(c).min(Vec3::ONE), number(roughness));
+                match sigma > 0.0 {
+                    false => builder.push(weight * c, frame(normal), Lobe::Lambert(Lambert)),
+                    // its colour enters through multiple scattering, so it is not just a factor
+                    true => builder.push(
+                        weight,
+                        frame(normal),
+                        Lobe::OrenNayar(OrenNayar::new(c, sigma.min(1.0))),
+                    ),
+                }
             }
             Closure::Glossy { color: c, roughness, anisotropy, rotation, normal } => {
-                let _ = anisotropy;
-                let ggx = Ggx::from_roughness(number(roughness));
+                let ggx = grain(number(roughness), number(anisotropy));
                 let frame = rotated(self.tangent_frame(normal.as_ref(), p), number(rotation));
                 let fresnel = Fresnel::constant(color(c).min(Vec3::ONE));
                 builder.push(weight, frame, Lobe::Reflection(Reflection::new(ggx, fresnel)));
@@ -117,22 +126,26 @@ impl Materials {
                 let lobe = Dielectric::refraction_only(ggx, sane_ior(number(ior)));
                 builder.push(weight * color(c), frame(normal), Lobe::Dielectric(lobe));
             }
-            Closure::Translucent { color: c, normal } | Closure::Sheen { color: c, normal, .. } => {
-                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Lambert(Lambert));
+            Closure::Translucent { color: c, normal } => {
+                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Translucent(Translucent));
             }
-            Closure::Principled(c) => self.push_principled(builder, c, weight, p),
+            Closure::Sheen { color: c, roughness, normal } => {
+                let lobe = Sheen::new(number(roughness));
+                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Sheen(lobe));
+            }
+            Closure::Principled(c) => self.push_principled(builder, c, weight, p, wo),
             Closure::Mix { factor, a, b } => {
                 let f = number(factor).clamp(0.0, 1.0);
                 if f < 1.0 {
-                    self.push(builder, a, weight * (1.0 - f), p);
+                    self.push(builder, a, weight * (1.0 - f), p, wo);
                 }
                 if f > 0.0 {
-                    self.push(builder, b, weight * f, p);
+                    self.push(builder, b, weight * f, p, wo);
                 }
             }
             Closure::Add { a, b } => {
-                self.push(builder, a, weight, p);
-                self.push(builder, b, weight, p);
+                self.push(builder, a, weight, p, wo);
+                self.push(builder, b, weight, p, wo);
             }
             Closure::Transparent { .. } | Closure::Emission { .. } => {}
         }
@@ -144,20 +157,46 @@ impl Materials {
         c: &PrincipledClosure,
         weight: Vec3,
         p: &SurfacePoint,
+        wo: Vec3,
     ) {
         let color = |v: &Value| self.textures.color(v, &p.at).max(Vec3::ZERO);
         let number = |v: &Value| self.textures.number(v, &p.at);
         let unit = |v: &Value| number(v).clamp(0.0, 1.0);
-        let frame = self.frame(c.normal.as_ref(), p);
-        let ggx = Ggx::from_roughness(unit(&c.roughness));
-        let base = color(&c.base_color).min(Vec3::ONE);
-        let (metallic, transmission) = (unit(&c.metallic), unit(&c.transmission));
-        let metal = Reflection::new(ggx, Fresnel::constant(base));
-        builder.push(weight * metallic, frame, Lobe::Reflection(metal));
-        let weight = weight * (1.0 - metallic);
-        let glass = Dielectric::new(ggx, sane_ior(number(&c.ior)));
-        builder.push(weight * transmission * base, frame, Lobe::Dielectric(glass));
-        builder.push(weight * (1.0 - transmission) * base, frame, Lobe::Lambert(Lambert));
+        let anisotropy = number(&c.anisotropy).clamp(-1.0, 1.0);
+        let frame = match anisotropy == 0.0 {
+            true => self.frame(c.normal.as_ref(), p),
+            false => self.tangent_frame(c.normal.as_ref(), p),
+        };
+        let coat = unit(&c.coat);
+        let coat_frame = match (&c.coat_normal, coat > 0.0) {
+            (Some(_), true) => self.frame(c.coat_normal.as_ref(), p),
+            _ => Frame::from_normal(p.ns),
+        };
+        let model = Principled {
+            base_color: color(&c.base_color).min(Vec3::ONE),
+            diffuse_roughness: unit(&c.diffuse_roughness),
+            metallic: unit(&c.metallic),
+            roughness: unit(&c.roughness),
+            ior: sane_ior(number(&c.ior)),
+            specular_level: number(&c.specular_level).max(0.0),
+            specular_tint: color(&c.specular_tint),
+            specular_color: c.specular_color.as_ref().map(|v| color(v).min(Vec3::ONE)),
+            anisotropy,
+            rotation: number(&c.rotation),
+            transmission: unit(&c.transmission),
+            coat,
+            coat_roughness: unit(&c.coat_roughness),
+            coat_ior: sane_ior(number(&c.coat_ior)),
+            coat_tint: color(&c.coat_tint).min(Vec3::ONE),
+            sheen: unit(&c.sheen),
+            sheen_roughness: unit(&c.sheen_roughness),
+            sheen_tint: color(&c.sheen_tint).min(Vec3::ONE),
+            metal_f90: match c.metal_f90 {
+                MetalEdge::White => MetalF90::White,
+                MetalEdge::Base => MetalF90::Base,
+            },
+        };
+        model.push(builder, weight, wo, frame, coat_frame);
     }
 
     /// The shading frame, with a normal map where there is one.
@@ -210,6 +249,15 @@ impl Materials {
 /// Keeps a refractive index from a texture within what exists.
 fn sane_ior(ior: f32) -> f32 {
     if ior.is_finite() { ior.clamp(1e-2, 1e2) } else { 1.5 }
+}
+
+/// Microfacets of a glossy closure, with the anisotropy of Blender's Glossy BSDF: from -0.99 to 0.99,
+/// positive values smoother along x.
+fn grain(roughness: f32, anisotropy: f32) -> Ggx {
+    let alpha = roughness * roughness;
+    let squeeze = 1.0 - anisotropy.abs().min(0.99);
+    let (short, long) = (alpha * squeeze, alpha / squeeze);
+    if anisotropy < 0.0 { Ggx::new(long, short) } else { Ggx::new(short, long) }
 }
 
 fn rotated(f: Frame, turns: f32) -> Frame {

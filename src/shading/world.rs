@@ -275,7 +275,7 @@ impl World {
             let emission = self.emission_towards(p, wo);
             return Shaded::Scatters {
                 weight: Vec3::ONE,
-                vertex: Vertex { bsdf: self.materials.bsdf(p), emission },
+                vertex: Vertex { bsdf: self.materials.bsdf(p, wo), emission },
             };
         }
         let through = self.materials.transparency(p.material, &p.at);
@@ -287,7 +287,7 @@ impl World {
             return Shaded::Through { weight: through / pass };
         }
         let weight = Vec3::splat(self.materials.opacity(p.material, &p.at) / (1.0 - pass));
-        Shaded::Scatters { weight, vertex: Vertex { bsdf: self.materials.bsdf(p), emission } }
+        Shaded::Scatters { weight, vertex: Vertex { bsdf: self.materials.bsdf(p, wo), emission } }
     }
 
     fn emission_towards(&self, p: &SurfacePoint, wo: Vec3) -> Vec3 {

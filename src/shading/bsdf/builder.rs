@@ -6,7 +6,7 @@ use crate::shading::lobes::{Lambert, Lobe};
 use glam::Vec3;
 
 /// Most lobes that one surface point can have.
-pub const CAPACITY: usize = 16;
+pub const CAPACITY: usize = 10;
 
 /// Collects weighted lobes. Mixing materials is scaling the weights that they push.
 #[derive(Clone, Debug)]
@@ -30,21 +30,41 @@ impl BsdfBuilder {
     /// Adds a lobe. The normal of `frame` is the shading normal; it is turned to the side of the
     /// geometric normal. Negative and non-finite weights count as zero, and a weight of zero adds nothing.
     pub fn push(&mut self, weight: Vec3, frame: Frame, lobe: Lobe) {
+        let entry = self.entry(weight, frame, lobe);
+        self.push_entry(entry);
+    }
+
+    /// Adds a lobe that lies over those pushed later. `weight`: of the whole stack; `share`: of the lobe in
+    /// it. Returns how much of the light seen along `wo` (world space) the lobe leaves to what is below: one
+    /// minus the largest channel of its directional albedo.
+    pub fn push_layer(&mut self, weight: Vec3, share: Vec3, frame: Frame, lobe: Lobe, wo: Vec3) -> f32 {
+        let entry = self.entry(weight * share, frame, lobe);
+        let side = 1f32.copysign(self.bsdf.ng.dot(wo));
+        let albedo = entry.seen_from(wo, side).map_or(Vec3::ZERO, |o| share * lobe.albedo(o));
+        self.push_entry(entry);
+        1.0 - albedo.max_element().clamp(0.0, 1.0)
+    }
+
+    fn entry(&self, weight: Vec3, frame: Frame, lobe: Lobe) -> Entry {
         let clean = |w: f32| if w.is_finite() { w.max(0.0) } else { 0.0 };
         let weight = Vec3::new(clean(weight.x), clean(weight.y), clean(weight.z));
-        if weight == Vec3::ZERO {
+        let frame = if frame.n.dot(self.bsdf.ng) < 0.0 {
+            Frame { s: frame.s, t: -frame.t, n: -frame.n }
+        } else {
+            frame
+        };
+        Entry { weight, frame, lobe, delta: lobe.is_delta() }
+    }
+
+    fn push_entry(&mut self, entry: Entry) {
+        if entry.weight == Vec3::ZERO {
             return;
         }
         if self.bsdf.len == CAPACITY {
             self.dropped += 1;
             return;
         }
-        let frame = if frame.n.dot(self.bsdf.ng) < 0.0 {
-            Frame { s: frame.s, t: -frame.t, n: -frame.n }
-        } else {
-            frame
-        };
-        self.bsdf.entries[self.bsdf.len] = Entry { weight, frame, lobe, delta: lobe.is_delta() };
+        self.bsdf.entries[self.bsdf.len] = entry;
         self.bsdf.len += 1;
     }
 

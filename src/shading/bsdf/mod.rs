@@ -11,8 +11,10 @@
 //! common, a continuous lobe is evaluated as seen at grazing incidence, and a delta lobe absorbs.
 
 mod builder;
+pub mod principled;
 
 pub use builder::{BsdfBuilder, CAPACITY};
+pub use principled::{MetalF90, Principled};
 
 use super::lobes::{Density, Kind, Lobe, MIN_COS, Side};
 use crate::math::density::{DiscreteProbability, ProjectedPdf};

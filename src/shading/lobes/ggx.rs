@@ -118,6 +118,15 @@ impl Ggx {
     fn unstretch(&self, h: Vec3) -> Vec3 {
         Vec3::new(self.ax * h.x, self.ay * h.y, h.z.max(1e-12)).normalize()
     }
+
+    /// From the perceptual roughness and an anisotropy in [-1,1] (Burley 2012, section 5.4: an aspect of
+    /// `sqrt(1 - 0.9 |anisotropy|)`). Positive: rougher along x; negative: along y.
+    pub fn anisotropic(roughness: f32, anisotropy: f32) -> Self {
+        let aspect = (1.0 - 0.9 * anisotropy.abs().min(1.0)).sqrt();
+        let alpha = roughness * roughness;
+        let (long, short) = (alpha / aspect, alpha * aspect);
+        if anisotropy < 0.0 { Self::new(short, long) } else { Self::new(long, short) }
+    }
 }
 
 /// Point of the unit sphere at height `z`, at the angle of `u` turns.

@@ -22,7 +22,12 @@ pub mod dielectric;
 pub mod fresnel;
 pub mod ggx;
 pub mod lambert;
+pub mod oren_nayar;
 pub mod reflection;
+pub mod sheen;
+#[cfg(test)]
+pub(super) mod testing;
+pub mod translucent;
 pub mod transparent;
 
 pub use density::Density;
@@ -30,7 +35,10 @@ pub use dielectric::Dielectric;
 pub use fresnel::Fresnel;
 pub use ggx::Ggx;
 pub use lambert::Lambert;
+pub use oren_nayar::OrenNayar;
 pub use reflection::Reflection;
+pub use sheen::Sheen;
+pub use translucent::Translucent;
 pub use transparent::Transparent;
 
 use crate::math::density::{DiscreteProbability, ProjectedPdf};
@@ -134,6 +142,12 @@ pub const MIN_COS: f32 = 1e-6;
 pub enum Lobe {
     /// Ideal diffuse reflection.
     Lambert(Lambert),
+    /// Rough diffuse reflection.
+    OrenNayar(OrenNayar),
+    /// Ideal diffuse transmission.
+    Translucent(Translucent),
+    /// Reflection off a layer of fibres.
+    Sheen(Sheen),
     /// Rough or smooth reflection off microfacets.
     Reflection(Reflection),
     /// Rough or smooth reflection and refraction at an interface.
@@ -147,6 +161,9 @@ macro_rules! each {
     ($self:ident, $lobe:ident => $call:expr) => {
         match $self {
             Lobe::Lambert($lobe) => $call,
+            Lobe::OrenNayar($lobe) => $call,
+            Lobe::Translucent($lobe) => $call,
+            Lobe::Sheen($lobe) => $call,
             Lobe::Reflection($lobe) => $call,
             Lobe::Dielectric($lobe) => $call,
             Lobe::Transparent($lobe) => $call,
@@ -184,7 +201,7 @@ impl Lobe {
     #[inline]
     pub fn is_delta(&self) -> bool {
         match self {
-            Self::Lambert(_) => false,
+            Self::Lambert(_) | Self::OrenNayar(_) | Self::Translucent(_) | Self::Sheen(_) => false,
             Self::Reflection(lobe) => lobe.is_delta(),
             Self::Dielectric(lobe) => lobe.is_delta(),
             Self::Transparent(_) => true,
@@ -195,8 +212,8 @@ impl Lobe {
     #[inline]
     pub fn transmits(&self) -> bool {
         match self {
-            Self::Lambert(_) | Self::Reflection(_) => false,
-            Self::Dielectric(_) | Self::Transparent(_) => true,
+            Self::Lambert(_) | Self::OrenNayar(_) | Self::Sheen(_) | Self::Reflection(_) => false,
+            Self::Translucent(_) | Self::Dielectric(_) | Self::Transparent(_) => true,
         }
     }
 
@@ -205,7 +222,7 @@ impl Lobe {
     pub fn eta(&self) -> f32 {
         match self {
             Self::Dielectric(lobe) => lobe.eta(),
-            Self::Lambert(_) | Self::Reflection(_) | Self::Transparent(_) => 1.0,
+            _ => 1.0,
         }
     }
 }

@@ -1,0 +1,179 @@
+//! The layered principled surface, as in Blender 4.2 and later (Principled BSDF, second version).
+//!
+//! From above: sheen, a coat, and a base which is a mixture of metal, glass, and a dielectric reflection
+//! over a diffuse body. Each layer takes from those below it the largest channel of its own directional
+//! albedo for the direction looked from (albedo scaling; Kulla and Conty 2017, "Revisiting physically
+//! based shading at Imageworks"). That direction alone decides, so the stack is not reciprocal, although
+//! its lobes are; it never reflects more than it receives.
+
+use super::BsdfBuilder;
+use crate::math::Frame;
+use crate::shading::lobes::fresnel::f0_from_ior;
+use crate::shading::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen};
+use glam::Vec3;
+use std::f32::consts::TAU;
+
+/// Reflectance of the metal towards grazing angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MetalF90 {
+    /// White at 90 degrees, tinted by `specular_tint` near 82 degrees.
+    White,
+    /// The base colour at every angle.
+    Base,
+}
+
+/// Parameters of the layered surface at one point. Unless said otherwise, numbers and the channels of
+/// colours are in [0,1]; roughness is the square root of the GGX alpha.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Principled {
+    /// Albedo of the diffuse body, normal reflectance of the metal, squared tint of the glass.
+    pub base_color: Vec3,
+    /// Roughness of the diffuse body (Oren-Nayar).
+    pub diffuse_roughness: f32,
+    /// Share of metal in the base.
+    pub metallic: f32,
+    /// Roughness of metal, glass and dielectric reflection.
+    pub roughness: f32,
+    /// Refractive index of the glass and of the dielectric reflection, above zero.
+    pub ior: f32,
+    /// Normal reflectance of the dielectric reflection: 0.5 is that of `ior`, 0 none. Not bounded.
+    pub specular_level: f32,
+    /// Factor on the normal reflectance of dielectrics; edge tint of the metal.
+    pub specular_tint: Vec3,
+    /// Normal reflectance of the dielectric reflection in place of that of `ior` (the specular workflow of
+    /// UsdPreviewSurface).
+    pub specular_color: Option<Vec3>,
+    /// Anisotropy of metal and dielectric reflection, in [-1,1].
+    pub anisotropy: f32,
+    /// Rotation of the anisotropy about the normal, in turns.
+    pub rotation: f32,
+    /// Share of glass in what is not metal.
+    pub transmission: f32,
+    /// Weight of the coat.
+    pub coat: f32,
+    /// Roughness of the coat.
+    pub coat_roughness: f32,
+    /// Refractive index of the coat; values below one count as one.
+    pub coat_ior: f32,
+    /// Transmittance of the coat along its normal.
+    pub coat_tint: Vec3,
+    /// Weight of the sheen.
+    pub sheen: f32,
+    /// Roughness of the sheen.
+    pub sheen_roughness: f32,
+    /// Colour of the sheen.
+    pub sheen_tint: Vec3,
+    /// What the metal reflects at grazing angles.
+    pub metal_f90: MetalF90,
+}
+
+/// Largest normal reflectance from which a refractive index is computed.
+const MAX_F0: f32 = 0.99;
+
+impl Principled {
+    /// Pushes the lobes. `wo`: the direction looked from, world space; `frame`: of the base, its x axis the
+    /// tangent of the anisotropy; `coat_frame`: of the coat.
+    pub fn push(&self, builder: &mut BsdfBuilder, weight: Vec3, wo: Vec3, frame: Frame, coat_frame: Frame) {
+        let mut weight = weight;
+        if self.sheen > 0.0 {
+            // fibres follow the surface that is outermost
+            let n = frame.n.lerp(coat_frame.n, self.coat).try_normalize().unwrap_or(frame.n);
+            let lobe = Lobe::Sheen(Sheen::new(self.sheen_roughness));
+            let share = self.sheen * self.sheen_tint;
+            weight *= builder.push_layer(weight, share, Frame::from_normal(n), lobe, wo);
+        }
+        if self.coat > 0.0 {
+            weight = self.push_coat(builder, weight, wo, coat_frame);
+        }
+        let grain = match self.anisotropy == 0.0 {
+            true => (Ggx::from_roughness(self.roughness), frame),
+            false => (Ggx::anisotropic(self.roughness, self.anisotropy), turned(frame, self.rotation)),
+        };
+        if self.metallic > 0.0 {
+            let lobe = Reflection::new(grain.0, self.metal());
+            builder.push(weight * self.metallic, grain.1, Lobe::Reflection(lobe));
+            weight *= 1.0 - self.metallic;
+        }
+        if self.transmission > 0.0 {
+            builder.push(weight * self.transmission, frame, Lobe::Dielectric(self.glass()));
+            weight *= 1.0 - self.transmission;
+        }
+        if weight == Vec3::ZERO {
+            return;
+        }
+        if let Some(fresnel) = self.specular() {
+            let lobe = Lobe::Reflection(Reflection::new(grain.0, fresnel));
+            weight *= builder.push_layer(weight, Vec3::ONE, grain.1, lobe, wo);
+        }
+        self.push_diffuse(builder, weight, frame);
+    }
+
+    /// Returns the weight of what is below.
+    fn push_coat(&self, builder: &mut BsdfBuilder, weight: Vec3, wo: Vec3, frame: Frame) -> Vec3 {
+        let eta = self.coat_ior.max(1.0);
+        let fresnel = Fresnel::Dielectric { eta, f0: Vec3::splat(f0_from_ior(eta)) };
+        let mut weight = weight;
+        if eta > 1.0 {
+            let lobe = Lobe::Reflection(Reflection::new(Ggx::from_roughness(self.coat_roughness), fresnel));
+            weight *= builder.push_layer(weight, Vec3::splat(self.coat), frame, lobe, wo);
+        }
+        // Beer's law along the refracted direction, the tint being that of the shortest path
+        let cos = frame.n.dot(wo).min(1.0);
+        let cos_t = (1.0 - (1.0 - cos * cos) / (eta * eta)).max(1e-6).sqrt();
+        let tint = self.coat_tint.powf(1.0 / cos_t);
+        weight * Vec3::ONE.lerp(tint, self.coat)
+    }
+
+    fn metal(&self) -> Fresnel {
+        match self.metal_f90 {
+            MetalF90::White => Fresnel::f82_tint(self.base_color, self.specular_tint.min(Vec3::ONE)),
+            MetalF90::Base => Fresnel::constant(self.base_color),
+        }
+    }
+
+    fn glass(&self) -> Dielectric {
+        let f0 = (f0_from_ior(self.ior) * self.specular_tint).min(Vec3::ONE);
+        // light that goes in and comes out again is tinted twice
+        let tint = self.base_color.map(f32::sqrt);
+        Dielectric::tinted(Ggx::from_roughness(self.roughness), self.ior, f0, Vec3::ONE, tint)
+    }
+
+    /// The dielectric reflection over the diffuse body, where there is one.
+    fn specular(&self) -> Option<Fresnel> {
+        if let Some(f0) = self.specular_color {
+            let none = f0 == Vec3::ZERO && self.ior == 1.0;
+            return (!none).then_some(Fresnel::Schlick { f0, f90: Vec3::ONE });
+        }
+        let f0 = f0_from_ior(self.ior) * 2.0 * self.specular_level;
+        // an index below one reflects as its inverse does, but for the total reflection
+        let eta = match self.specular_level == 0.5 {
+            true => self.ior.max(1.0 / self.ior),
+            false => ior_from_f0(f0),
+        };
+        (eta > 1.0).then(|| Fresnel::Dielectric { eta, f0: (f0 * self.specular_tint).min(Vec3::ONE) })
+    }
+
+    fn push_diffuse(&self, builder: &mut BsdfBuilder, weight: Vec3, frame: Frame) {
+        if self.diffuse_roughness > 0.0 {
+            let lobe = OrenNayar::new(self.base_color, self.diffuse_roughness);
+            builder.push(weight, frame, Lobe::OrenNayar(lobe));
+        } else {
+            builder.push(weight * self.base_color, frame, Lobe::Lambert(Lambert));
+        }
+    }
+}
+
+/// Refractive index, at least one, of the normal reflectance `f0`.
+fn ior_from_f0(f0: f32) -> f32 {
+    let r = f0.clamp(0.0, MAX_F0).sqrt();
+    (1.0 + r) / (1.0 - r)
+}
+
+/// The frame turned about its normal.
+fn turned(f: Frame, turns: f32) -> Frame {
+    let (sin, cos) = (TAU * turns).sin_cos();
+    Frame { s: f.s * cos + f.t * sin, t: f.t * cos - f.s * sin, n: f.n }
+}
+
+#[cfg(test)]
+mod tests;
