@@ -8,11 +8,10 @@ RENDER_ARGS ?= --time 30
 
 LIBRARY := build/libsegue.so
 VENV := .venv
-BPY_VENV := .venv-bpy
-BPY_VERSION := 5.0.1
 PIP_FLAGS := --quiet --disable-pip-version-check
 
-.PHONY: all library render test lint test-rust test-c test-python test-blender-current test-blender bench clean
+.PHONY: all library render test lint test-rust test-c test-python test-blender-current test-blender \
+        blender-extension bench clean
 
 all: library $(VENV)/ready
 
@@ -30,11 +29,6 @@ library:
 $(VENV)/ready: python/pyproject.toml python/hatch_build.py
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install $(PIP_FLAGS) --editable 'python[cli,test]'
-	touch $@
-
-$(BPY_VENV)/ready:
-	$(PYTHON) -m venv $(BPY_VENV)
-	$(BPY_VENV)/bin/pip install $(PIP_FLAGS) bpy==$(BPY_VERSION) pytest
 	touch $@
 
 # A gallery scene, as EXR and PNG in results/.
@@ -63,15 +57,20 @@ test-c: library
 test-python: all
 	$(VENV)/bin/pytest -q tests/python
 
-test-blender-current: all $(BPY_VENV)/ready
-	SEGUE_BPY_PYTHON=$(CURDIR)/$(BPY_VENV)/bin/python $(VENV)/bin/pytest -q tests/blender
+test-blender-current: all
+	$(VENV)/bin/python tests/blender/run_versions.py 5.0
 
 # Every supported Blender, each in an environment of its own.
 test-blender: all
 	$(VENV)/bin/python tests/blender/run_versions.py
 
+# The archive that Blender installs.
+blender-extension: library $(VENV)/ready
+	$(VENV)/bin/python blender_addon/build.py --output dist
+
 bench: all
 	$(CARGO) bench --locked
+	$(VENV)/bin/python benches/startup.py
 
 clean:
 	rm -rf target build results $(VENV) .venv-*

@@ -255,6 +255,7 @@ impl RenderHandle {
         options.world_to_camera =
             Some(glam::DMat4::from(self.0.world().scene().camera.to_world.inverse()).as_mat4());
         options.attributes.insert("segue/version".into(), version());
+        options.attributes.insert("segue/settings".into(), settings.source.clone());
         options.attributes.insert("segue/statistics".into(), serde_json::to_string(&self.0.statistics())?);
         Ok(options)
     }

@@ -15,6 +15,8 @@ pub enum Method {
 /// Validated settings of a render.
 #[derive(Clone, Debug)]
 pub struct Settings {
+    /// The JSON they were read from.
+    pub source: String,
     /// How light transport is computed.
     pub method: Method,
     /// Width and height of the full film.
@@ -130,6 +132,7 @@ impl Settings {
             passes = passes.with(pass);
         }
         Ok(Self {
+            source: json.into(),
             method: j.integrator,
             resolution: j.resolution,
             crop: Rect::new(x0, y0, x1 - x0, y1 - y0),
