@@ -1,13 +1,13 @@
 //! Materials at a surface point: the tree of closures becomes a BSDF, an emission and a transparency.
 
-use super::bsdf::{Bsdf, BsdfBuilder, MetalF90, Principled};
+use super::bsdf::{Bsdf, BsdfBuilder, CAPACITY, MetalF90, Principled};
 use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen, Translucent};
 use super::surface::{SurfacePoint, normal_matrix, normalize_any};
 use super::texture::{MeshPoint, TextureSet};
 use crate::math::Frame;
-use crate::scene::Scene;
 use crate::scene::material::{Closure, MetalEdge, NormalMap, NormalSpace, PrincipledClosure, Value};
 use crate::scene::needs::may_be_transparent;
+use crate::scene::{Scene, Warnings};
 use glam::{Mat3, Vec3};
 use std::f32::consts::TAU;
 use std::sync::Arc;
@@ -23,7 +23,15 @@ pub struct Materials {
 
 impl Materials {
     /// Prepares the materials of a scene.
-    pub fn new(scene: Arc<Scene>) -> Self {
+    pub fn new(scene: Arc<Scene>, warnings: &mut Warnings) -> Self {
+        for m in &scene.materials {
+            let most = most_lobes(&m.surface);
+            if most > CAPACITY {
+                let problem =
+                    format!("more than {CAPACITY} lobes may meet in a point; the last are left out");
+                warnings.add(format!("material {:?}", m.name), problem, (most - CAPACITY) as u64);
+            }
+        }
         let transparent = scene.materials.iter().map(|m| may_be_transparent(m, &scene)).collect();
         Self { textures: TextureSet::new(scene.clone()), transparent, scene }
     }
@@ -246,6 +254,25 @@ impl Materials {
     }
 }
 
+/// Most lobes that a closure can have at one point.
+fn most_lobes(closure: &Closure) -> usize {
+    let some = |v: &Value| usize::from(!v.is(0.0));
+    match closure {
+        Closure::Mix { a, b, .. } | Closure::Add { a, b } => most_lobes(a) + most_lobes(b),
+        Closure::Principled(p) => {
+            let over = some(&p.sheen) + some(&p.coat);
+            let base = match p.metallic.is(1.0) {
+                true => 0,
+                // the dielectric reflection and the diffuse body
+                false => some(&p.transmission) + if p.transmission.is(1.0) { 0 } else { 2 },
+            };
+            over + some(&p.metallic) + base
+        }
+        Closure::Transparent { .. } | Closure::Emission { .. } => 0,
+        _ => 1,
+    }
+}
+
 /// Keeps a refractive index from a texture within what exists.
 fn sane_ior(ior: f32) -> f32 {
     if ior.is_finite() { ior.clamp(1e-2, 1e2) } else { 1.5 }
@@ -263,4 +290,24 @@ fn grain(roughness: f32, anisotropy: f32) -> Ggx {
 fn rotated(f: Frame, turns: f32) -> Frame {
     let (sin, cos) = (TAU * turns).sin_cos();
     Frame { s: f.s * cos + f.t * sin, t: f.t * cos - f.s * sin, n: f.n }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn count(json: &str) -> usize {
+        most_lobes(&serde_json::from_str(json).unwrap())
+    }
+
+    #[test]
+    fn the_most_lobes_are_counted() {
+        assert_eq!(count(r#"{"type":"principled"}"#), 2);
+        assert_eq!(count(r#"{"type":"principled","metallic":1,"coat":1}"#), 2);
+        assert_eq!(count(r#"{"type":"principled","transmission":1,"sheen":1}"#), 2);
+        assert_eq!(count(r#"{"type":"principled","metallic":0.5,"transmission":0.5}"#), 4);
+        let mix = r#"{"type":"mix","a":{"type":"transparent"},"b":{"type":"add",
+            "a":{"type":"glass"},"b":{"type":"principled"}}}"#;
+        assert_eq!(count(mix), 3);
+    }
 }

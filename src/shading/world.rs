@@ -205,7 +205,7 @@ impl World {
         costs.push(BuildCost { name: "acceleration structure", seconds, bytes: accel.memory_bytes() as u64 });
 
         let start = Instant::now();
-        let materials = Materials::new(scene.clone());
+        let materials = Materials::new(scene.clone(), &mut warnings);
         let triangles = emissive_triangles(&scene, &materials, &mut warnings);
         let (low, high) = accel.bounds();
         let bounds = SceneBounds {
