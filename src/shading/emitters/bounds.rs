@@ -73,14 +73,13 @@ impl Cone {
 
 /// The cone around a wide cone `a` and a narrow one `b` (axis and cosine of the half angle each).
 fn wrap(a: Vec3, cos_a: f32, b: Vec3, cos_b: f32) -> (Vec3, f32) {
-    if cos_a <= -1.0 || (a == b && cos_a <= cos_b) {
+    let sine = |cos: f32| (1.0 - cos * cos).max(0.0).sqrt();
+    // the narrow one is inside where the angle between is at most the difference of the half angles
+    if cos_a <= -1.0 || a.dot(b) >= cos_a * cos_b + sine(cos_a) * sine(cos_b) || a == b {
         return (a, cos_a);
     }
     let (angle_a, angle_b) = (cos_a.min(1.0).acos(), cos_b.min(1.0).acos());
     let between = a.cross(b).length().atan2(a.dot(b));
-    if (between + angle_b).min(PI) <= angle_a {
-        return (a, cos_a);
-    }
     let half = 0.5 * (angle_a + between + angle_b);
     match a.cross(b).try_normalize() {
         Some(around) if half < PI => {

@@ -2,7 +2,7 @@
 
 use super::bounds::{Cone, LightBounds};
 use super::tree::{Content, Item, MAX_DEPTH, build};
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// A bounding volume hierarchy over analytic lights, for rays that want all of them.
 #[derive(Clone, Debug)]
@@ -12,8 +12,8 @@ pub(super) struct HitTree {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    min: Vec3,
-    max: Vec3,
+    min: Vec3A,
+    max: Vec3A,
     content: Content,
 }
 
@@ -29,8 +29,11 @@ impl HitTree {
         };
         let mut items: Vec<Item> = lights.map(item).collect();
         let nodes = build(&mut items);
-        let node =
-            |n: &super::tree::BuiltNode| Node { min: n.bounds.min, max: n.bounds.max, content: n.content };
+        let node = |n: &super::tree::BuiltNode| Node {
+            min: n.bounds.min.into(),
+            max: n.bounds.max.into(),
+            content: n.content,
+        };
         Self { nodes: nodes.iter().map(node).collect() }
     }
 
@@ -40,42 +43,39 @@ impl HitTree {
         if self.nodes.is_empty() {
             return;
         }
-        let inverse = direction.recip();
+        let origin = Vec3A::from(origin);
+        // a huge slope in place of an infinite one: zero times it is not NaN
+        let inverse = Vec3A::from(direction).recip().clamp(Vec3A::splat(-1e30), Vec3A::splat(1e30));
         let mut stack = [0u32; MAX_DEPTH + 1];
         let (mut top, mut current) = (0, 0u32);
         loop {
             let node = &self.nodes[current as usize];
-            let next = match node.content {
-                _ if !node.is_met(origin, inverse, t_max) => None,
-                Content::Leaf(emitter) => {
-                    candidate(emitter);
-                    None
+            if node.is_met(origin, inverse, t_max) {
+                match node.content {
+                    Content::Leaf(emitter) => candidate(emitter),
+                    Content::Inner(right) => {
+                        stack[top] = right;
+                        top += 1;
+                        current += 1;
+                        continue;
+                    }
                 }
-                Content::Inner(right) => {
-                    stack[top] = right;
-                    top += 1;
-                    Some(current + 1)
-                }
-            };
-            current = match next {
-                Some(n) => n,
-                None if top == 0 => return,
-                None => {
-                    top -= 1;
-                    stack[top]
-                }
-            };
+            }
+            if top == 0 {
+                return;
+            }
+            top -= 1;
+            current = stack[top];
         }
     }
 }
 
 impl Node {
     #[inline]
-    fn is_met(&self, origin: Vec3, inverse: Vec3, t_max: f32) -> bool {
+    fn is_met(&self, origin: Vec3A, inverse: Vec3A, t_max: f32) -> bool {
         let (a, b) = ((self.min - origin) * inverse, (self.max - origin) * inverse);
-        // `f32::min` and `max` ignore the NaN of a ray that runs in the plane of a side
-        let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z));
-        let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z));
+        let near = a.min(b).max_element();
+        let far = a.max(b).min_element();
         near <= far * 1.000_001 && far >= 0.0 && near <= t_max
     }
 }
@@ -114,9 +114,13 @@ mod tests {
                 let mut found = Vec::new();
                 tree.for_each(o, d, t_max, |e| found.push(e));
                 found.sort_unstable();
-                let node = |&(_, min, max): &(u32, Vec3, Vec3)| Node { min, max, content: Content::Leaf(0) };
                 for b in &boxes {
-                    if node(b).is_met(o, d.recip(), t_max) {
+                    let node = Node { min: b.1.into(), max: b.2.into(), content: Content::Leaf(0) };
+                    if node.is_met(
+                        o.into(),
+                        d.recip().clamp(Vec3::splat(-1e30), Vec3::splat(1e30)).into(),
+                        t_max,
+                    ) {
                         assert!(found.binary_search(&b.0).is_ok(), "ray {i} misses box {}", b.0);
                     }
                 }

@@ -31,10 +31,12 @@ const ABSENT: u8 = u8::MAX;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    min: Vec3,
-    max: Vec3,
+    /// The sphere around the box.
+    center: Vec3,
+    radius2: f32,
     axis: Vec3,
     cos_normals: f32,
+    sin_normals: f32,
     cos_emission: f32,
     /// In units of the tree; negative for a node that shines to both sides.
     intensity: f32,
@@ -61,10 +63,22 @@ impl LightTree {
         }
         let built = build(&mut items);
         let nodes = built.iter().map(|n| {
-            let LightBounds { min, max, cone, intensity } = n.bounds;
+            let LightBounds { cone, intensity, .. } = n.bounds;
+            let center = n.bounds.center();
+            let radius2 = (n.bounds.max - center).length_squared();
             let intensity = if cone.two_sided { -intensity } else { intensity } as f32;
             let (axis, cos_normals, cos_emission) = (cone.axis, cone.cos_normals, cone.cos_emission);
-            Node { min, max, axis, cos_normals, cos_emission, intensity, content: n.content }
+            let sin_normals = sine(cos_normals);
+            Node {
+                center,
+                radius2,
+                axis,
+                cos_normals,
+                sin_normals,
+                cos_emission,
+                intensity,
+                content: n.content,
+            }
         });
         let mut tree =
             Self { nodes: nodes.collect(), trails: vec![Trail { turns: 0, depth: ABSENT }; count], unit };
@@ -150,9 +164,8 @@ impl Node {
     /// Estimate of the irradiance in units of the tree per area; zero only where nothing can arrive.
     #[inline]
     fn importance(&self, receiver: &Receiver) -> f64 {
-        let half = (self.max - self.min) * 0.5;
-        let to = self.min + half - receiver.position;
-        let (radius2, distance2) = (half.length_squared(), to.length_squared());
+        let to = self.center - receiver.position;
+        let (radius2, distance2) = (self.radius2, to.length_squared());
         let intensity = self.intensity.abs();
         // from within the sphere around the box everything may come from everywhere
         if distance2 <= radius2 * 1.0001 {
@@ -162,14 +175,14 @@ impl Node {
             return intensity as f64 / distance2.max(least).max(f32::MIN_POSITIVE) as f64;
         }
         let direction = to / distance2.sqrt();
-        let sin_b = (radius2 / distance2).sqrt().min(1.0);
-        let cos_b = (1.0 - radius2 / distance2).max(0.0).sqrt();
+        let sin2_b = (radius2 / distance2).min(1.0);
+        let (sin_b, cos_b) = (sin2_b.sqrt(), (1.0 - sin2_b).sqrt());
         let mut cos_w = -direction.dot(self.axis);
         if self.intensity < 0.0 {
             cos_w = cos_w.abs();
         }
         // the least angle to a normal of any point towards the receiver
-        let (cos_a, sin_a) = reduce(cos_w, sine(cos_w), self.cos_normals, sine(self.cos_normals));
+        let (cos_a, sin_a) = reduce(cos_w, sine(cos_w), self.cos_normals, self.sin_normals);
         let (cos, _) = reduce(cos_a, sin_a, cos_b, sin_b);
         if cos < self.cos_emission - SLACK {
             return 0.0;

@@ -3,6 +3,7 @@
 use crate::math::{ONE_MINUS_EPSILON, luminance};
 use crate::scene::Image;
 use glam::{DVec3, Vec2, Vec3};
+use half::bf16;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -19,14 +20,18 @@ pub(super) enum Layout {
 /// An image, and a pyramid of sums to sample it by (hierarchical sample warping, Clarberg et al. 2005).
 ///
 /// The density is constant over a texel's cell, where it is in proportion to the mean of the *bilinear*
-/// interpolation: it is nowhere zero where the interpolation is not. Cells themselves are computed from
-/// the image when needed, so that only a third of a float per texel is stored.
+/// interpolation: it is nowhere zero where the interpolation is not. The means are kept in 16 bits, which
+/// is a matter of noise and not of truth: the density is defined by what is kept.
 #[derive(Clone, Debug)]
 pub(super) struct MapSampler {
     image: Arc<Image>,
     layout: Layout,
     width: usize,
     height: usize,
+    /// Mean luminance of each cell.
+    cells: Vec<bf16>,
+    /// Share of the layout's measure that one cell of each row takes.
+    shares: Vec<f32>,
     /// Sums over 2x2 cells, over 4x4 and so on, up to the whole.
     levels: Vec<Level>,
     mean: Vec3,
@@ -48,27 +53,69 @@ impl Level {
 impl MapSampler {
     pub fn new(image: Arc<Image>, layout: Layout) -> Self {
         let (width, height) = (image.width() as usize, image.height() as usize);
-        let mut map = Self { image, layout, width, height, levels: Vec::new(), mean: Vec3::ZERO };
-        map.mean = map.integrate_colour();
+        let (cells, levels) = (vec![bf16::ZERO; width * height], Vec::new());
+        let shares = (0..height).map(|y| cell_share(layout, width, height, y) as f32).collect();
+        let mut map = Self { image, layout, width, height, cells, shares, levels, mean: Vec3::ZERO };
+        map.fill_cells();
+        let mut level = map.sums_of(width, height, |x, y| map.cell(x, y));
+        while level.sums.len() > 1 {
+            let above = map.sums_of(level.width, level.height, |x, y| level.get(x, y));
+            map.levels.push(std::mem::replace(&mut level, above));
+        }
+        map.levels.push(level);
+        map
+    }
+
+    /// Computes the cells' means and the mean colour.
+    fn fill_cells(&mut self) {
+        /// Rows per task: two more are read than are written.
+        const BAND: usize = 32;
+        let mut cells = std::mem::take(&mut self.cells);
+        let bands = cells.par_chunks_mut(BAND * self.width).enumerate().map(|(band, cells)| {
+            let first = (band * BAND) as isize;
+            let rows = (cells.len() / self.width) as isize;
+            let mut colour = DVec3::ZERO;
+            // rows from one above the band to one below it
+            let luminances: Vec<Vec<f32>> = (first - 1..=first + rows)
+                .map(|y| {
+                    let mut sum = DVec3::ZERO;
+                    let row = (0..self.width as isize).map(|x| {
+                        let c = self.texel(x, y);
+                        sum += c.as_dvec3();
+                        luminance(c)
+                    });
+                    let row = row.collect();
+                    if (first..first + rows).contains(&y) {
+                        colour += sum * self.row_weight(y as usize);
+                    }
+                    row
+                })
+                .collect();
+            for (three, row) in luminances.windows(3).zip(cells.chunks_mut(self.width)) {
+                let column = |x: usize| three[0][x] * 0.125 + three[1][x] * 0.75 + three[2][x] * 0.125;
+                for (x, cell) in row.iter_mut().enumerate() {
+                    let (left, right) = self.neighbours(x);
+                    *cell = keep(column(left) * 0.125 + column(x) * 0.75 + column(right) * 0.125);
+                }
+            }
+            colour
+        });
+        let colours: Vec<DVec3> = bands.collect();
+        self.mean = colours.into_iter().sum::<DVec3>().as_vec3();
+        self.cells = cells;
+    }
+
+    /// Sums over 2x2 entries of a grid.
+    fn sums_of(&self, width: usize, height: usize, get: impl Fn(usize, usize) -> f32 + Sync) -> Level {
         let (w, h) = (width.div_ceil(2), height.div_ceil(2));
         let mut sums = vec![0.0; w * h];
         sums.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-            let cells = [map.cell_row(2 * y), map.cell_row(2 * y + 1)];
             for (x, sum) in row.iter_mut().enumerate() {
-                *sum = (2 * x..(2 * x + 2).min(width)).map(|x| cells[0][x] + cells[1][x]).sum();
+                let (x, y) = (2 * x, 2 * y);
+                *sum = get(x, y) + get(x + 1, y) + get(x, y + 1) + get(x + 1, y + 1);
             }
         });
-        map.levels.push(Level { width: w, height: h, sums });
-        while let Some(below) = map.levels.last().filter(|l| l.width * l.height > 1) {
-            let (w, h) = (below.width.div_ceil(2), below.height.div_ceil(2));
-            let sum = |i: usize| {
-                let (x, y) = (i % w * 2, i / w * 2);
-                below.get(x, y) + below.get(x + 1, y) + below.get(x, y + 1) + below.get(x + 1, y + 1)
-            };
-            let sums = (0..w * h).map(sum).collect();
-            map.levels.push(Level { width: w, height: h, sums });
-        }
-        map
+        Level { width: w, height: h, sums }
     }
 
     /// Mean colour over the layout's measure.
@@ -80,14 +127,25 @@ impl MapSampler {
         self.levels.last().map_or(0.0, |l| l.get(0, 0))
     }
 
-    /// A texel; neighbours beyond the edges are clamped or, around the sphere, periodic.
+    /// A texel. At most one beyond the edges: clamped or, around the sphere, periodic.
     fn texel(&self, x: isize, y: isize) -> Vec3 {
+        let (width, height) = (self.width as isize, self.height as isize);
         let x = match self.layout {
-            Layout::Flat => x.clamp(0, self.width as isize - 1),
-            Layout::LatLong => x.rem_euclid(self.width as isize),
+            Layout::Flat => x.clamp(0, width - 1),
+            Layout::LatLong if x < 0 => x + width,
+            Layout::LatLong if x >= width => x - width,
+            Layout::LatLong => x,
         };
-        let y = y.clamp(0, self.height as isize - 1);
-        self.image.texel(x as u32, y as u32).truncate().max(Vec3::ZERO)
+        self.image.texel(x as u32, y.clamp(0, height - 1) as u32).truncate().max(Vec3::ZERO)
+    }
+
+    /// Columns to the left and to the right of `x`.
+    fn neighbours(&self, x: usize) -> (usize, usize) {
+        let last = self.width - 1;
+        match self.layout {
+            Layout::Flat => (x.saturating_sub(1), (x + 1).min(last)),
+            Layout::LatLong => (if x == 0 { last } else { x - 1 }, if x == last { 0 } else { x + 1 }),
+        }
     }
 
     /// Bilinear interpolation at a point of the unit square, y downwards.
@@ -100,73 +158,24 @@ impl MapSampler {
         top.lerp(bottom, f.y)
     }
 
-    /// Share of the layout's measure that one cell of row `y` takes.
-    fn cell_share(&self, y: usize) -> f64 {
-        let rows = match self.layout {
-            Layout::Flat => 1.0 / self.height as f64,
-            // cos a - cos b = 2 sin((a+b)/2) sin((b-a)/2), of the whole 2
-            Layout::LatLong => {
-                let step = PI / self.height as f64;
-                ((y as f64 + 0.5) * step).sin() * (0.5 * step).sin()
-            }
-        };
-        rows / self.width as f64
+    /// Weight of the texels of row `y` in the mean of the bilinear interpolation: they spread over the
+    /// cells of their own row and of the two next to it.
+    fn row_weight(&self, y: usize) -> f64 {
+        let share = |y: usize| self.shares[y] as f64;
+        let (above, below) = (share(y.saturating_sub(1)), share((y + 1).min(self.height - 1)));
+        0.125 * above + 0.75 * share(y) + 0.125 * below
     }
 
-    /// Mean luminance of the bilinear interpolation over a cell: weights 1/8, 6/8, 1/8 along each axis.
     fn cell_mean(&self, x: usize, y: usize) -> f32 {
-        let (x, y) = (x as isize, y as isize);
-        let row = |y: isize| {
-            let l = |x: isize| luminance(self.texel(x, y));
-            l(x - 1) * 0.125 + l(x) * 0.75 + l(x + 1) * 0.125
-        };
-        row(y - 1) * 0.125 + row(y) * 0.75 + row(y + 1) * 0.125
+        self.cells[y * self.width + x].to_f32()
     }
 
     /// Weight of a cell: its mean times its share; zero outside the image.
     fn cell(&self, x: usize, y: usize) -> f32 {
         match x < self.width && y < self.height {
-            true => self.cell_mean(x, y) * self.cell_share(y) as f32,
+            true => self.cell_mean(x, y) * self.shares[y],
             false => 0.0,
         }
-    }
-
-    /// [`MapSampler::cell`] for a whole row, reading each texel of the three rows once.
-    fn cell_row(&self, y: usize) -> Vec<f32> {
-        if y >= self.height {
-            return vec![0.0; self.width];
-        }
-        let column = |x: isize| {
-            let l = |dy: isize| luminance(self.texel(x, y as isize + dy));
-            l(-1) * 0.125 + l(0) * 0.75 + l(1) * 0.125
-        };
-        let share = self.cell_share(y) as f32;
-        let (mut left, mut middle) = (column(-1), column(0));
-        (0..self.width)
-            .map(|x| {
-                let right = column(x as isize + 1);
-                let mean = left * 0.125 + middle * 0.75 + right * 0.125;
-                (left, middle) = (middle, right);
-                mean * share
-            })
-            .collect()
-    }
-
-    fn integrate_colour(&self) -> Vec3 {
-        let rows: Vec<DVec3> = (0..self.height)
-            .into_par_iter()
-            .map(|y| {
-                let sum: DVec3 = (0..self.width).map(|x| self.texel(x as isize, y as isize).as_dvec3()).sum();
-                // a texel spreads over its own row and the two next to it
-                let row = |y: isize| self.cell_share(y.clamp(0, self.height as isize - 1) as usize);
-                let y = y as isize;
-                let edge = (y == 0) as u8 as f64 + (y == self.height as isize - 1) as u8 as f64;
-                let inner = row(y - 1) * (y > 0) as u8 as f64
-                    + row(y + 1) * (y + 1 < self.height as isize) as u8 as f64;
-                sum * (row(y) * (0.75 + 0.125 * edge) + inner * 0.125)
-            })
-            .collect();
-        rows.into_iter().sum::<DVec3>().as_vec3()
     }
 
     /// Point of the unit square, and its density per unit of the layout's measure. `None` where the
@@ -220,6 +229,27 @@ impl MapSampler {
             Layout::LatLong => 2.0 * TAU,
         };
         cell_mean / (self.total() * measure as f32)
+    }
+}
+
+/// Share of the layout's measure that one cell of row `y` takes.
+fn cell_share(layout: Layout, width: usize, height: usize, y: usize) -> f64 {
+    let row = match layout {
+        Layout::Flat => 1.0 / height as f64,
+        // cos a - cos b = 2 sin((a+b)/2) sin((b-a)/2), of the whole 2
+        Layout::LatLong => {
+            let step = PI / height as f64;
+            ((y as f64 + 0.5) * step).sin() * (0.5 * step).sin()
+        }
+    };
+    row / width as f64
+}
+
+/// A cell's mean as it is kept: finite, and zero only where it is.
+fn keep(mean: f32) -> bf16 {
+    match bf16::from_f32(mean).min(bf16::MAX) {
+        k if k == bf16::ZERO && mean > 0.0 => bf16::MIN_POSITIVE_SUBNORMAL,
+        k => k,
     }
 }
 

@@ -52,6 +52,10 @@ impl Selector {
 
     /// How the choice divides; `None` where nothing contributes at all.
     fn sides(&self, receiver: &Receiver) -> Option<Sides> {
+        if self.infinite.is_empty() {
+            // the tree itself says whether something contributes
+            return Some(Sides { bounded: 1.0, far: 0.0, even: 0.0 });
+        }
         let near = self.tree.importance(receiver);
         let (mut far, mut alive) = (0.0, 0);
         for importance in self.infinite.iter().map(|i| i.importance(receiver)).filter(|&i| i > 0.0) {

@@ -32,7 +32,7 @@ const BALANCED_FROM: u32 = 32;
 /// Greatest depth of a leaf below the root.
 pub(super) const MAX_DEPTH: usize = 63;
 /// Items from which on only the longest axis is tried.
-const ONE_AXIS_FROM: usize = 4096;
+const ONE_AXIS_FROM: usize = 256;
 /// Items from which on the two halves are built in parallel.
 const PARALLEL_FROM: usize = 4096;
 const BINS: usize = 12;
@@ -74,6 +74,9 @@ fn build_range(items: &mut [Item], nodes: &mut [BuiltNode], base: u32, depth: u3
 
 /// Reorders items into two parts that are not empty; where the second one starts.
 fn split(items: &mut [Item], depth: u32) -> usize {
+    if items.len() == 2 {
+        return 1;
+    }
     let centers = items.iter().map(|i| i.bounds.center());
     let (low, high) = centers.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
     let extent = high - low;
@@ -137,9 +140,9 @@ fn best_split(items: &[Item], axis: usize, low: Vec3, extent: Vec3) -> Option<Sp
     let mut below = None;
     let mut best: Option<Split> = None;
     for i in 0..BINS - 1 {
-        if let Some(b) = &bins[i] {
-            grow(&mut below, b);
-        }
+        // an empty bin moves nothing across
+        let Some(b) = &bins[i] else { continue };
+        grow(&mut below, b);
         if let (Some(a), Some(b)) = (&below, &above[i]) {
             let cost = shape * (cost(a) + cost(b));
             if best.as_ref().is_none_or(|s| cost < s.cost) {
