@@ -12,7 +12,7 @@ const ACROSS: usize = 20;
 const AROUND: usize = 20;
 const SAMPLES: u32 = 200_000;
 /// Points per bin, along each axis, at which densities are taken.
-const FINE: u32 = 40;
+const FINE: u32 = 24;
 
 /// Equal bins of the cone around `frame.n` whose half angle has `1 - cos` of `one_minus_cos`.
 struct Bins {
@@ -154,6 +154,32 @@ fn directions_towards_shapes() {
             let r = receiver([x, 0.2, 0.0], [0.0, 0.0, 1.0]);
             directions_towards(&format!("{shape} from {x}"), &emitters_of(&[&json], &[], &[]), r);
         }
+    }
+}
+
+#[test]
+fn directions_towards_triangles() {
+    for (scale, height) in [(1.0, 0.3), (0.1, 1.0)] {
+        let vertices = [Vec3::ZERO, Vec3::X * scale, Vec3::new(0.3, -1.0, 0.5) * scale];
+        let vertices = vertices.map(|v| v + Vec3::Z * height);
+        let t = MeshTriangle { instance: 0, triangle: 0, vertices, radiance: Vec3::ONE, two_sided: false };
+        let e = emitters_of(&[], &[t], &[]);
+        let r = receiver([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]);
+        let [a, b, c] = vertices;
+        let normal = (b - a).cross(c - a).normalize();
+        let pdf = |w: Vec3| {
+            let distance = (a - r.position).dot(normal) / w.dot(normal);
+            let point = r.position + w * distance;
+            let inside = |a: Vec3, b: Vec3| (b - a).cross(point - a).dot(normal) >= 0.0;
+            if distance > 0.0 && inside(a, b) && inside(b, c) && inside(c, a) {
+                let hit = EmitterHit { emitter: FIRST, distance, point, normal, radiance: Vec3::ONE };
+                e.pdf_towards(&r, w, &hit).value() as f64
+            } else {
+                0.0
+            }
+        };
+        let sample = |i: u32| Some(e.sample_towards(FIRST, &r, pair(i, 0))?.direction);
+        check(&format!("towards a triangle of {scale}"), sample, pdf);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Sizes, distances and contrasts far from the ordinary.
 
 use super::support::*;
-use glam::Vec3;
-use segue::shading::emitters::{EmitterHit, Incident, Receiver};
+use glam::{Vec2, Vec3};
+use segue::shading::emitters::{EmitterHit, Incident, MeshTriangle, Receiver};
 use std::f64::consts::PI;
 
 /// Red irradiance of a surface facing up at `x`.
@@ -212,4 +212,25 @@ fn rect_images_are_upright_for_who_looks_at_the_light() {
         l
     };
     assert_eq!((seen(0.4, 0.4), seen(-0.4, 0.4), seen(0.4, -0.4)), (1.0, 0.0, 0.0));
+}
+
+#[test]
+fn receivers_next_to_and_on_triangles() {
+    let vertices = [Vec3::ZERO, Vec3::X, Vec3::new(0.2, 1e-3, 0.0)];
+    let t = |two_sided| MeshTriangle { instance: 0, triangle: 0, vertices, radiance: Vec3::ONE, two_sided };
+    for e in [emitters_of(&[], &[t(false)], &[]), emitters_of(&[], &[t(true)], &[])] {
+        for z in [-0.1, -1e-6, -1e-20, 0.0, 1e-30, 1e-9, 1e-4, 0.01, 1.0, f32::NAN] {
+            for at in [Vec2::ZERO, Vec2::X, Vec2::new(0.2, 5e-4), Vec2::new(0.5, 0.0), Vec2::new(2.0, 0.0)] {
+                let r = Receiver { position: at.extend(z), normal: None };
+                for i in 0..300 {
+                    if let Some(s) = e.sample_towards(FIRST, &r, pair(i, 0)) {
+                        assert!(s.direction.is_finite() && s.distance > 0.0, "{at} {z}: {s:?}");
+                        assert!(s.incident.estimate().is_finite(), "{at} {z}: {s:?}");
+                        let b = s.barycentrics.unwrap();
+                        assert!(b.min_element() >= 0.0 && b.element_sum() < 1.000_001, "{b}");
+                    }
+                }
+            }
+        }
+    }
 }

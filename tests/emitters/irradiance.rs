@@ -278,7 +278,7 @@ fn point_and_spot_follow_the_inverse_square() {
     let (d2, cos) = (4.25, 2.0 / 4.25f64.sqrt());
     let json = format!(r#"{{"type":"point","intensity":[7,1,1],"transform":{m}}}"#);
     check("point", &json, floor(0.0, 0.0), 7.0 * cos / d2, 0.2);
-    for (size, blend) in [(0.6, 0.0), (0.6, 0.7), (3.0, 1.0)] {
+    for (size, blend) in [(0.6, 0.0), (0.6, 0.7), (3.0, 1.0), (5.0, 0.5)] {
         let json = format!(
             r#"{{"type":"point","intensity":[7,1,1],"transform":{m},"shaping":{{"spot_size":{size},"spot_blend":{blend}}}}}"#
         );
@@ -399,6 +399,12 @@ fn triangles_follow_lamberts_formula() {
     let vertices = [Vec3::new(-0.5, -0.4, 1.0), Vec3::new(0.1, 0.9, 0.8), Vec3::new(0.8, -0.3, 1.2)];
     let r = floor(0.1, 0.0);
     let expected = polygon(&vertices.map(|v| v.as_dvec3()), origin(&r), DVec3::Z);
+    // far away, where points are chosen by area
+    let small = vertices.map(|v| v * 0.1 + Vec3::Z);
+    let t =
+        [MeshTriangle { instance: 0, triangle: 0, vertices: small, radiance: Vec3::ONE, two_sided: false }];
+    let far = polygon(&small.map(|v| v.as_dvec3()), origin(&r), DVec3::Z);
+    check_scene("small triangle", &emitters_of(&[], &t, &[]), &t, r, Some(far), 0.2);
     for two_sided in [false, true] {
         let t = [MeshTriangle {
             instance: 3,

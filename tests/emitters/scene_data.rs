@@ -35,6 +35,7 @@ fn bad_descriptions_are_refused_by_name() {
         (r#"{"type":"point","intensity":[1,1,1],"shaping":{"cone":1}}"#, "cone"),
         (r#"{"type":"point","intensity":[1,1,1],"shaping":{"cone_angle":1,"spread":1}}"#, "exclude"),
         (r#"{"type":"point","intensity":[1,1,1],"shaping":{"spot_blend":1}}"#, "spot_size"),
+        (r#"{"type":"point","intensity":[1,1,1],"shaping":{"spot_size":1,"spot_blend":2}}"#, "spot_blend"),
         (r#"{"type":"point","intensity":[1,1,1],"shaping":{"cone_angle":-1}}"#, "cone_angle"),
         (r#"{"type":"point","intensity":[1,1,1],"shaping":{"focus":-1}}"#, "focus"),
         (r#"{"type":"distant"}"#, "exactly one"),

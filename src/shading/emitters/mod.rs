@@ -20,6 +20,7 @@ mod scene_bounds;
 mod selection;
 mod sphere;
 mod spherical_rect;
+mod spherical_triangle;
 mod tree;
 mod triangle;
 mod triangle_table;
@@ -170,7 +171,7 @@ impl Emitters {
     pub fn pdf_towards(&self, receiver: &Receiver, direction: Vec3, hit: &EmitterHit) -> SolidAnglePdf {
         match self.get(hit.emitter) {
             Kind::Light(l) => l.pdf_towards(receiver, direction, hit),
-            Kind::Triangle(t) => t.pdf_towards(direction, hit.distance),
+            Kind::Triangle(t) => t.pdf_towards(receiver.position, direction, hit.distance),
         }
     }
 

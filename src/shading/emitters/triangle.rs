@@ -2,9 +2,10 @@
 
 use super::bounds::{Cone, LightBounds};
 use super::sample::{Emission, FromSample, SurfacePoint};
+use super::spherical_triangle::SphericalTriangle;
 use crate::math::density::{AreaPdf, EtenduePdf, ProjectedPdf, SolidAnglePdf};
 use crate::math::{Frame, luminance, warp};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::f64::consts::PI;
 
@@ -32,6 +33,9 @@ pub(super) struct Triangle {
     two_sided: bool,
 }
 
+/// Solid angle from which on points are chosen by it.
+const NEAR: f64 = 0.05;
+
 impl Triangle {
     /// `None` where it cannot emit: no area, no radiance, or not finite.
     pub fn new(t: &MeshTriangle) -> Option<Self> {
@@ -39,8 +43,33 @@ impl Triangle {
         let edges = [b - a, c - a];
         let area = edges[0].cross(edges[1]).length();
         let emits = t.radiance.min_element() >= 0.0 && t.radiance.max_element() > 0.0;
-        let sound = t.radiance.is_finite() && area > 0.0 && area.is_finite() && a.is_finite();
+        // a subnormal area has no precise normal
+        let sound = t.radiance.is_finite() && area.is_normal() && a.is_finite();
         (emits && sound).then_some(Self { vertex: a, edges, radiance: t.radiance, two_sided: t.two_sided })
+    }
+
+    /// The triangle as seen from a receiver, where it is so large that points are better chosen by solid
+    /// angle.
+    fn spherical(&self, x: Vec3) -> Option<SphericalTriangle> {
+        let [a, b] = self.edges;
+        let size2 = a.length_squared().max(b.length_squared()).max((a - b).length_squared());
+        let middle = self.vertex + (a + b) / 3.0;
+        if middle.distance_squared(x) > 4.0 * size2 {
+            return None;
+        }
+        let corner = |at: Vec3| at.as_dvec3() - x.as_dvec3();
+        let corners = [self.vertex, self.vertex + a, self.vertex + b].map(corner);
+        Some(SphericalTriangle::new(corners)).filter(|s| s.solid_angle() > NEAR)
+    }
+
+    /// Barycentrics where a ray from `x` meets the triangle's plane, kept inside the triangle.
+    fn barycentrics(&self, x: Vec3, direction: DVec3) -> Vec2 {
+        let [a, b] = self.edges.map(|e| e.as_dvec3());
+        let o = x.as_dvec3() - self.vertex.as_dvec3();
+        let (p, q) = (direction.cross(b), o.cross(a));
+        let at = DVec2::new(o.dot(p), direction.dot(q)) / a.dot(p);
+        let at = at.max(DVec2::ZERO);
+        (at / at.element_sum().max(1.0)).as_vec2()
     }
 
     /// Unit normal and area.
@@ -56,19 +85,27 @@ impl Triangle {
 
     pub fn towards(&self, x: Vec3, u: Vec2) -> Option<(SurfacePoint, Vec3, Vec2)> {
         let (normal, area) = self.geometry();
-        let b = warp::uniform_triangle(u);
+        let spherical = self.spherical(x);
+        let b = match &spherical {
+            Some(s) => self.barycentrics(x, s.sample(u)),
+            None => warp::uniform_triangle(u),
+        };
         let point = self.point(b);
         let facing = if self.two_sided && normal.dot(x - point) < 0.0 { -normal } else { normal };
-        let sample = SurfacePoint::by_area(x, point, facing, AreaPdf(1.0 / area))?;
+        let mut sample = SurfacePoint::by_area(x, point, facing, AreaPdf(1.0 / area))?;
+        if let Some(s) = &spherical {
+            sample.pdf = SolidAnglePdf(1.0 / s.solid_angle() as f32);
+        }
         Some((sample, self.radiance, b))
     }
 
-    pub fn pdf_towards(&self, direction: Vec3, distance: f32) -> SolidAnglePdf {
+    pub fn pdf_towards(&self, x: Vec3, direction: Vec3, distance: f32) -> SolidAnglePdf {
         let (normal, area) = self.geometry();
         let cos = -normal.dot(direction);
-        match self.two_sided || cos > 0.0 {
-            true => AreaPdf(1.0 / area).to_solid_angle(distance, cos),
-            false => SolidAnglePdf(0.0),
+        match self.spherical(x) {
+            _ if !self.two_sided && cos <= 0.0 => SolidAnglePdf(0.0),
+            Some(s) => SolidAnglePdf(1.0 / s.solid_angle() as f32),
+            None => AreaPdf(1.0 / area).to_solid_angle(distance, cos),
         }
     }
 
