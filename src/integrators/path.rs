@@ -221,7 +221,7 @@ impl PathWalk<'_, '_> {
         FirstHit {
             depth: self.context.sensor.depth(hit.place.position),
             position: world.absolute(hit.place.position),
-            normal: hit.ns,
+            normal: vertex.bsdf.normal(),
             albedo: vertex.bsdf.albedo(wo).clamp(Vec3::ZERO, Vec3::ONE),
             uv: world.uv(hit),
             object_index: world.scene().group(hit.instance).object_index,

@@ -39,6 +39,12 @@ impl Frame {
         Self { s, t: n.cross(s), n }
     }
 
+    /// The frame turned about its normal, counter-clockwise, by a number of full turns.
+    pub fn turned(&self, turns: f32) -> Self {
+        let (sin, cos) = (std::f32::consts::TAU * turns).sin_cos();
+        Self { s: self.s * cos + self.t * sin, t: self.t * cos - self.s * sin, n: self.n }
+    }
+
     /// World to local.
     #[inline]
     pub fn to_local(&self, v: Vec3) -> Vec3 {

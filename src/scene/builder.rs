@@ -83,7 +83,12 @@ impl SceneBuilder {
     /// Adds a material from its JSON description; its index.
     pub fn add_material(&mut self, name: &str, json: &str) -> Result<u32, SceneError> {
         let id = next_id(self.materials.len(), "materials")?;
-        self.materials.push(Material::from_json(name, json, self.textures.len())?);
+        let material = Material::from_json(name, json, self.textures.len())?;
+        if material.is_clamped() {
+            let what = "a colour or share of light outside 0 to 1 is clamped";
+            self.warnings.add(format!("material {name:?}"), what, 1);
+        }
+        self.materials.push(material);
         Ok(id)
     }
 

@@ -339,6 +339,30 @@ impl Material {
         }
     }
 
+    /// Whether a constant that is a share of light lies outside `[0,1]`; it is clamped when shaded.
+    pub fn is_clamped(&self) -> bool {
+        let outside =
+            |v: &Value| matches!(v, Value::Constant(c) if c.min_element() < 0.0 || c.max_element() > 1.0);
+        let mut found = outside(&self.opacity);
+        self.surface.for_each(&mut |c| {
+            found |= match c {
+                Closure::Diffuse { color, .. }
+                | Closure::Glossy { color, .. }
+                | Closure::Glass { color, .. }
+                | Closure::Refraction { color, .. }
+                | Closure::Transparent { color }
+                | Closure::Translucent { color, .. }
+                | Closure::Sheen { color, .. } => outside(color),
+                Closure::Principled(p) => {
+                    [&p.base_color, &p.metallic, &p.transmission, &p.coat, &p.sheen].into_iter().any(outside)
+                }
+                Closure::Mix { factor, .. } => outside(factor),
+                Closure::Emission { .. } | Closure::Add { .. } => false,
+            }
+        });
+        found
+    }
+
     /// Calls `f` with every parameter, normal maps as textures.
     pub fn for_each_value(&self, f: &mut dyn FnMut(&Value)) {
         f(&self.opacity);
@@ -453,6 +477,17 @@ mod tests {
             matches!(&**a, Closure::Diffuse { color: Value::Constant(c), .. } if *c == Vec3::new(0.1, 0.2, 0.3))
         );
         assert!(matches!(&**b, Closure::Principled(p) if p.metallic.is(1.0) && p.ior.is(1.5)));
+    }
+
+    #[test]
+    fn reflecting_more_than_all_light_is_noticed() {
+        let clamped = |surface: &str| {
+            Material::from_json("m", &format!(r#"{{"surface":{surface}}}"#), 0).unwrap().is_clamped()
+        };
+        assert!(clamped(r#"{"type":"diffuse","color":[0.5,1.5,0.5]}"#));
+        assert!(clamped(r#"{"type":"add","a":{"type":"glass","color":-1},"b":{"type":"emission"}}"#));
+        assert!(!clamped(r#"{"type":"emission","strength":50}"#));
+        assert!(!clamped(r#"{"type":"principled","ior":3,"specular_level":2}"#));
     }
 
     #[test]

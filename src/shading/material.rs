@@ -9,7 +9,6 @@ use crate::scene::material::{Closure, MetalEdge, NormalMap, NormalSpace, Princip
 use crate::scene::needs::may_be_transparent;
 use crate::scene::{Scene, Warnings};
 use glam::{Mat3, Vec3};
-use std::f32::consts::TAU;
 use std::sync::Arc;
 
 /// All materials of a scene, ready to be evaluated.
@@ -119,20 +118,24 @@ impl Materials {
                 }
             }
             Closure::Glossy { color: c, roughness, anisotropy, rotation, normal } => {
-                let ggx = grain(number(roughness), number(anisotropy));
-                let frame = rotated(self.tangent_frame(normal.as_ref(), p), number(rotation));
+                let anisotropy = number(anisotropy);
+                let ggx = grain(number(roughness), anisotropy);
+                let frame = match anisotropy == 0.0 {
+                    true => frame(normal),
+                    false => self.tangent_frame(normal.as_ref(), p).turned(number(rotation)),
+                };
                 let fresnel = Fresnel::constant(color(c).min(Vec3::ONE));
                 builder.push(weight, frame, Lobe::Reflection(Reflection::new(ggx, fresnel)));
             }
             Closure::Glass { color: c, roughness, ior, normal } => {
                 let ggx = Ggx::from_roughness(number(roughness));
                 let lobe = Dielectric::new(ggx, sane_ior(number(ior)));
-                builder.push(weight * color(c), frame(normal), Lobe::Dielectric(lobe));
+                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Dielectric(lobe));
             }
             Closure::Refraction { color: c, roughness, ior, normal } => {
                 let ggx = Ggx::from_roughness(number(roughness));
                 let lobe = Dielectric::refraction_only(ggx, sane_ior(number(ior)));
-                builder.push(weight * color(c), frame(normal), Lobe::Dielectric(lobe));
+                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Dielectric(lobe));
             }
             Closure::Translucent { color: c, normal } => {
                 builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Translucent(Translucent));
@@ -285,11 +288,6 @@ fn grain(roughness: f32, anisotropy: f32) -> Ggx {
     let squeeze = 1.0 - anisotropy.abs().min(0.99);
     let (short, long) = (alpha * squeeze, alpha / squeeze);
     if anisotropy < 0.0 { Ggx::new(long, short) } else { Ggx::new(short, long) }
-}
-
-fn rotated(f: Frame, turns: f32) -> Frame {
-    let (sin, cos) = (TAU * turns).sin_cos();
-    Frame { s: f.s * cos + f.t * sin, t: f.t * cos - f.s * sin, n: f.n }
 }
 
 #[cfg(test)]

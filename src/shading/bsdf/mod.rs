@@ -121,6 +121,13 @@ impl Bsdf {
         self.ng
     }
 
+    /// The normal of what is seen: the mean shading normal of the lobes by their weight, or the geometric
+    /// one where nothing scatters.
+    pub fn normal(&self) -> Vec3 {
+        let sum: Vec3 = self.entries().iter().map(|e| e.frame.n * e.weight.element_sum()).sum();
+        sum.try_normalize().unwrap_or(self.ng)
+    }
+
     /// Whether nothing scatters.
     #[inline]
     pub fn is_black(&self) -> bool {

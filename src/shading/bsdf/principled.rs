@@ -11,7 +11,6 @@ use crate::math::Frame;
 use crate::shading::lobes::fresnel::f0_from_ior;
 use crate::shading::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen};
 use glam::Vec3;
-use std::f32::consts::TAU;
 
 /// Reflectance of the metal towards grazing angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,7 +86,7 @@ impl Principled {
         }
         let grain = match self.anisotropy == 0.0 {
             true => (Ggx::from_roughness(self.roughness), frame),
-            false => (Ggx::anisotropic(self.roughness, self.anisotropy), turned(frame, self.rotation)),
+            false => (Ggx::anisotropic(self.roughness, self.anisotropy), frame.turned(self.rotation)),
         };
         if self.metallic > 0.0 {
             let lobe = Reflection::new(grain.0, self.metal());
@@ -167,12 +166,6 @@ impl Principled {
 fn ior_from_f0(f0: f32) -> f32 {
     let r = f0.clamp(0.0, MAX_F0).sqrt();
     (1.0 + r) / (1.0 - r)
-}
-
-/// The frame turned about its normal.
-fn turned(f: Frame, turns: f32) -> Frame {
-    let (sin, cos) = (TAU * turns).sin_cos();
-    Frame { s: f.s * cos + f.t * sin, t: f.t * cos - f.s * sin, n: f.n }
 }
 
 #[cfg(test)]
