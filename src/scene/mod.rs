@@ -11,6 +11,8 @@ pub mod material;
 pub mod mesh;
 pub mod needs;
 pub mod texture;
+mod triangulate;
+pub mod value;
 
 pub use builder::{Scene, SceneBuilder};
 pub use camera::Camera;

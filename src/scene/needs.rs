@@ -2,8 +2,9 @@
 //! costs it nothing.
 
 use super::light::LightKind;
-use super::material::{Channel, Closure, Value};
+use super::material::Closure;
 use super::texture::Texture;
+use super::value::{Channel, Value};
 use super::{Material, Scene};
 use serde::Serialize;
 

@@ -5,8 +5,9 @@ use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflectio
 use super::surface::{SurfacePoint, normal_matrix, normalize_any};
 use super::texture::{MeshPoint, TextureSet};
 use crate::math::Frame;
-use crate::scene::material::{Closure, MetalEdge, NormalMap, NormalSpace, PrincipledClosure, Value};
+use crate::scene::material::{Closure, MetalEdge, NormalMap, NormalSpace, PrincipledClosure};
 use crate::scene::needs::may_be_transparent;
+use crate::scene::value::Value;
 use crate::scene::{Scene, Warnings};
 use glam::{Mat3, Vec3};
 use std::sync::Arc;

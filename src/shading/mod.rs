@@ -4,12 +4,15 @@ pub mod bsdf;
 pub mod emitters;
 pub mod lobes;
 
+mod emissive;
 mod material;
+mod ray;
 mod sensor;
 mod surface;
 mod texture;
 mod world;
 
+pub use ray::{LightPoint, LightSample, Piece};
 pub use sensor::{CameraRay, Sensor};
 pub use surface::SurfacePoint;
-pub use world::{BuildCost, LightPoint, LightSample, Piece, Shaded, Vertex, World, WorldError};
+pub use world::{BuildCost, Shaded, Vertex, World, WorldError};

@@ -1,9 +1,9 @@
 //! Texture lookup at a surface point.
 
 use crate::math::luminance;
-use crate::scene::material::{Channel, Value};
 use crate::scene::mesh::Attribute;
 use crate::scene::texture::{ImageTexture, Reconstruction, Texture, Wrap};
+use crate::scene::value::{Channel, Value};
 use crate::scene::{Image, Mesh, Scene};
 use glam::{Vec2, Vec3, Vec4};
 use std::ops::{Add, Mul};

@@ -2,15 +2,15 @@
 //! met and lights sampled, surfaces shaded.
 
 use super::bsdf::Bsdf;
+use super::emissive::emissive_triangles;
 use super::emitters::{EmitterHit, Emitters, Incident, MeshTriangle, Receiver, SceneBounds};
 use super::material::Materials;
+use super::ray::{LightPoint, LightSample, Piece, Target};
 use super::surface::{SurfacePoint, place};
 use super::texture::MeshPoint;
 use crate::accel::offset::SurfacePoint as Place;
-use crate::accel::{Accel, AccelError, InstanceGeometry, MeshGeometry, Ray};
-use crate::scene::needs::may_emit;
+use crate::accel::{Accel, AccelError, InstanceGeometry, MeshGeometry};
 use crate::scene::{Needs, Scene, SceneError, Warnings};
-use crate::shading::CameraRay;
 use glam::{DVec3, Vec2, Vec2Swizzles, Vec3};
 use std::sync::Arc;
 use std::time::Instant;
@@ -47,53 +47,6 @@ pub struct World {
     costs: Vec<BuildCost>,
 }
 
-/// A stretch of a ray between two surfaces. A ray that passes through transparent surfaces is a chain of
-/// pieces; light that it meets is weighed as seen from where the first one began.
-#[derive(Clone, Copy, Debug)]
-pub struct Piece {
-    ray: Ray,
-    /// Unit direction.
-    pub direction: Vec3,
-    /// Distance from where the ray began to where this piece does.
-    travelled: f32,
-}
-
-/// Light met along a ray.
-#[derive(Clone, Copy, Debug)]
-pub struct LightPoint {
-    /// Radiance against the ray.
-    pub radiance: Vec3,
-    /// Unit direction of the ray.
-    direction: Vec3,
-    /// Where it was met, with the distance from the ray's very beginning.
-    hit: EmitterHit,
-}
-
-/// Light sampled from a surface point.
-#[derive(Clone, Copy, Debug)]
-pub struct LightSample {
-    /// Unit direction to the light.
-    pub direction: Vec3,
-    /// Radiance; of a delta light, the irradiance of a surface that faces it.
-    pub radiance: Vec3,
-    /// Density per solid angle; of a delta light, the probability of having chosen it.
-    pub pdf: f32,
-    /// Whether nothing else could have found this direction.
-    pub is_delta: bool,
-    target: Target,
-}
-
-/// Where sampled light comes from.
-#[derive(Clone, Copy, Debug)]
-enum Target {
-    /// Far away, along the sample's direction.
-    Infinity,
-    /// A point in space.
-    Point(Vec3),
-    /// A point of a surface that is part of the scene.
-    Surface(Place),
-}
-
 /// A surface point, shaded.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertex {
@@ -120,52 +73,6 @@ pub enum Shaded {
         vertex: Vertex,
     },
 }
-
-impl LightSample {
-    /// The ray that must be free for the light to arrive.
-    fn ray_from(&self, p: &Place) -> Ray {
-        match &self.target {
-            Target::Infinity => p.spawn(self.direction),
-            Target::Point(target) => p.segment_to_point(*target),
-            Target::Surface(target) => p.segment_to(target),
-        }
-    }
-}
-
-impl Piece {
-    /// The first piece of a camera ray.
-    pub fn from_camera(c: &CameraRay) -> Self {
-        let ray = Ray { origin: c.origin, direction: c.direction, t_min: c.range[0], t_max: c.range[1] };
-        Self { ray, direction: c.direction, travelled: 0.0 }
-    }
-
-    /// The first piece of a ray that leaves a surface.
-    pub fn leaving(p: &SurfacePoint, direction: Vec3) -> Self {
-        Self { ray: p.place.spawn(direction), direction, travelled: 0.0 }
-    }
-
-    /// The next piece, beyond a surface that was passed.
-    pub fn beyond(&self, p: &SurfacePoint) -> Self {
-        let ray = p.place.spawn(self.direction);
-        let step = (ray.origin - self.ray.origin).length();
-        let ray = Ray { t_max: self.ray.t_max - step, ..ray };
-        Self { ray, direction: self.direction, travelled: self.travelled + step }
-    }
-}
-
-/// Emissive triangles beyond this number are found by hitting them only: choosing among so many costs
-/// more memory than it is worth.
-const MOST_SAMPLED_TRIANGLES: usize = 1 << 23;
-/// Points of a triangle at which its mean radiance is taken.
-const EMISSION_POINTS: [Vec2; 7] = [
-    Vec2::new(1.0 / 3.0, 1.0 / 3.0),
-    Vec2::new(0.1, 0.1),
-    Vec2::new(0.8, 0.1),
-    Vec2::new(0.1, 0.8),
-    Vec2::new(0.45, 0.45),
-    Vec2::new(0.1, 0.45),
-    Vec2::new(0.45, 0.1),
-];
 
 impl World {
     /// Builds the ray tracing structure and the emitters, on the current rayon pool. `keep_all`: leave
@@ -431,52 +338,4 @@ impl World {
         }
         weight
     }
-}
-
-/// The triangles that emit, with their mean radiance.
-fn emissive_triangles(scene: &Scene, materials: &Materials, warnings: &mut Warnings) -> Vec<MeshTriangle> {
-    let emits: Vec<bool> = scene
-        .materials
-        .iter()
-        .map(|m| {
-            let mut found = false;
-            m.surface.for_each(&mut |c| found |= may_emit(c));
-            found
-        })
-        .collect();
-    let mut triangles = Vec::new();
-    for (i, instance) in scene.instances.iter().enumerate() {
-        let group = &scene.groups[instance.group as usize];
-        if !group.materials.iter().any(|&m| emits[m as usize]) {
-            continue;
-        }
-        let mesh = &scene.meshes[group.mesh as usize];
-        if triangles.len() + mesh.triangles.len() > MOST_SAMPLED_TRIANGLES {
-            let what = "too many emissive triangles: the rest of them is not sampled, only hit";
-            warnings.add(format!("instances {:?}", group.name), what, 1);
-            break;
-        }
-        for t in 0..mesh.triangles.len() as u32 {
-            let material = scene.material_index(i as u32, t);
-            if !emits[material as usize] {
-                continue;
-            }
-            let at = |barycentrics| MeshPoint { mesh: group.mesh, triangle: t, barycentrics };
-            let sum: Vec3 = EMISSION_POINTS
-                .into_iter()
-                .map(|b| materials.emission(material, &at(b)) * materials.opacity(material, &at(b)))
-                .sum();
-            let corners = mesh.triangles[t as usize].map(|v| mesh.positions[v as usize]);
-            let [a, b, c] = corners.map(|p| instance.to_world.transform_point3(p));
-            let vertices = if scene.is_mirrored(i as u32) { [a, c, b] } else { [a, b, c] };
-            triangles.push(MeshTriangle {
-                instance: i as u32,
-                triangle: t,
-                vertices,
-                radiance: sum / EMISSION_POINTS.len() as f32,
-                two_sided: group.two_sided_emission,
-            });
-        }
-    }
-    triangles
 }

@@ -52,7 +52,8 @@ const ALBEDO_ERROR: f32 = 0.015;
 
 #[test]
 fn never_reflects_more_than_it_receives() {
-    let variants: &[(&str, fn(&mut Principled))] = &[
+    type Change = fn(&mut Principled);
+    let variants: &[(&str, Change)] = &[
         ("default", |_| ()),
         ("rough diffuse", |p| p.diffuse_roughness = 0.8),
         ("metal", |p| p.metallic = 1.0),
