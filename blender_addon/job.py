@@ -151,7 +151,7 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
     for index, view in enumerate(views):
         if view:
             engine.active_view_set(view)
-        export_camera(exporter, engine, depsgraph, log)
+        export_camera(scene, engine, depsgraph, log)
         settings = render_settings(depsgraph, frame, film_size(engine), preview=engine.is_preview)
         if index == 0:
             _report(engine, log, scene.info())

@@ -6,12 +6,9 @@ import math
 from typing import Any
 
 import bpy
-import numpy as np
 from mathutils import Matrix
 
 from ..log import ExportLog
-from .depsgraph import Exporter
-from .extent import Extent
 
 
 def camera_window(
@@ -64,8 +61,6 @@ def camera_json(
     resolution: tuple[int, int],
     pixel_aspect: tuple[float, float],
     shift_x: float,
-    extent: Extent,
-    world_visible: bool,
     log: ExportLog,
 ) -> dict[str, Any]:
     """The camera object of the ABI; `matrix` is camera to world without scale."""
@@ -81,17 +76,8 @@ def camera_json(
         "transform": [value for row in matrix for value in row],
         "window": camera_window(camera, resolution, pixel_aspect, shift_x),
         "near": camera.clip_start,
+        "far": camera.clip_end,
     }
-    # Blender shows the world behind the far plane, Segue nothing: so the plane is passed
-    # on only where it cuts something and there is no world to be seen.
-    view = np.array(matrix)
-    if extent.farthest(view[:3, 3], -view[:3, 2]) > camera.clip_end:
-        if world_visible:
-            log.warn(
-                f"Camera '{camera_object.name}': the clip end is ignored, it would hide the world"
-            )
-        else:
-            result["far"] = camera.clip_end
     dof = camera.dof
     if dof.use_dof:
         stop = max(dof.aperture_fstop, 1e-5)
@@ -113,7 +99,7 @@ def camera_json(
 
 
 def export_camera(
-    exporter: Exporter,
+    scene: Any,
     engine: bpy.types.RenderEngine,
     depsgraph: bpy.types.Depsgraph,
     log: ExportLog,
@@ -129,8 +115,6 @@ def export_camera(
         (engine.resolution_x, engine.resolution_y),
         (render.pixel_aspect_x, render.pixel_aspect_y),
         engine.camera_shift_x(camera),
-        exporter.extent,
-        exporter.world_visible,
         log,
     )
-    exporter.scene.set_camera(camera.name, data)
+    scene.set_camera(camera.name, data)

@@ -6,11 +6,9 @@ from collections.abc import Callable
 from types import ModuleType
 
 import bpy
-import numpy as np
 
 from ..log import ExportLog
 from ..nodes.material import Translator
-from .extent import Extent
 from .instances import Group, Survey, survey
 from .lights import light_json
 from .mesh import MeshArrays, add_mesh
@@ -18,7 +16,7 @@ from .world import export_world
 
 
 class Exporter:
-    """Fills `scene` with all but the camera, and learns the `extent` of its surfaces."""
+    """Fills `scene` with all but the camera."""
 
     def __init__(
         self,
@@ -28,15 +26,13 @@ class Exporter:
         stop: Callable[[], bool],
     ) -> None:
         self.scene = segue.Scene()
-        self.extent = Extent()
-        self.world_visible = False
         self._segue = segue
         self._depsgraph = depsgraph
         self._log = log
         self._stop = stop
         self._translator = Translator(self.scene, log)
-        # Mesh pointer -> id and corners of the box; None for a mesh without faces.
-        self._meshes: dict[int, tuple[int, np.ndarray] | None] = {}
+        # Mesh pointer -> id; None for a mesh without faces.
+        self._meshes: dict[int, int | None] = {}
 
     def run(self) -> bool:
         """Export everything; false when the user wants to stop."""
@@ -54,7 +50,7 @@ class Exporter:
                 return False
             self._add_group(group, materials, found)
         self._add_lights(found)
-        self.world_visible = export_world(self.scene, self._depsgraph, self._translator, self._log)
+        export_world(self.scene, self._depsgraph, self._translator, self._log)
         return True
 
     def _add_group(self, group: Group, materials: list[int], found: Survey) -> None:
@@ -64,18 +60,16 @@ class Exporter:
             arrays = MeshArrays(group.mesh)
             self._meshes[pointer] = None
             if arrays.triangle_count:
-                mesh = add_mesh(self._segue, self.scene, arrays, self._translator.attributes)
-                self._meshes[pointer] = (mesh, arrays.box())
-        entry = self._meshes[pointer]
-        if entry is None:
+                self._meshes[pointer] = add_mesh(
+                    self._segue, self.scene, arrays, self._translator.attributes
+                )
+        mesh = self._meshes[pointer]
+        if mesh is None:
             return
-        mesh, box = entry
-        transforms = found.matrices[group.members]
-        self.extent.add(box, transforms)
         self.scene.add_instances(
             group.traits.name,
             mesh,
-            transforms,
+            found.matrices[group.members],
             materials=materials,
             camera_visible=group.traits.camera_visible,
             two_sided_emission=True,

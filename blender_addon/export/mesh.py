@@ -64,10 +64,6 @@ class MeshArrays:
         self.indices = corner_points.astype(np.uint32)[self.corners]
         self.polygons = _get(mesh.loop_triangle_polygons, "value", self.triangle_count, np.int32)
 
-    def box(self) -> np.ndarray:
-        """Lowest and highest coordinates, (2, 3)."""
-        return np.stack([self.points.min(axis=0), self.points.max(axis=0)]).astype(np.float64)
-
     def slots(self) -> np.ndarray | None:
         """Material slot of each triangle; None where all are 0."""
         attribute = self.mesh.attributes.get("material_index")

@@ -62,14 +62,12 @@ def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> lis
 
 def export_world(
     scene: Any, depsgraph: bpy.types.Depsgraph, translator: Translator, log: ExportLog
-) -> bool:
-    """Add the world of the view layer, if it shines; whether the camera sees it."""
+) -> None:
+    """Add the world of the view layer, if it shines."""
     view_layer = depsgraph.view_layer_eval
     if not view_layer.use_sky:
-        return False
+        return
     world = getattr(view_layer, "world_override", None) or depsgraph.scene_eval.world
     data = world_json(world, translator, log)
-    if data is None:
-        return False
-    scene.add_light(world.name, data)
-    return data["camera_visible"]
+    if data is not None:
+        scene.add_light(world.name, data)
