@@ -11,6 +11,7 @@ import pytest
 # Module of cases -> engine: "fake" records what the add-on exports, "real" renders, "installed" is
 # the extension's archive.
 MODULES = {
+    "agreement": "real",
     "camera": "fake",
     "engine": "fake",
     "extension": "installed",
@@ -18,6 +19,8 @@ MODULES = {
     "geometry": "fake",
     "lights": "fake",
     "materials": "fake",
+    "rendering": "real",
+    "shared": "real",
     "world": "fake",
 }
 

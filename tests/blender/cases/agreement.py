@@ -1,0 +1,254 @@
+"""The same scene in Segue and in Cycles gives the same picture."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix
+
+import agreement
+import builders
+
+
+def _check(found: agreement.Comparison, mean: float, blocks: float, correlation: float) -> None:
+    print(found)
+    assert np.abs(found.mean).max() < mean, found
+    assert found.blocks < blocks, found
+    assert found.correlation > correlation, found
+
+
+def _environment(pixels: np.ndarray, rotation: tuple[float, float, float], strength: float) -> None:
+    _, tree, background = builders.world()
+    texture, mapping = (
+        tree.nodes.new("ShaderNodeTexEnvironment"),
+        tree.nodes.new("ShaderNodeMapping"),
+    )
+    place = tree.nodes.new("ShaderNodeTexCoord")
+    texture.image = builders.image("Environment", pixels, "Linear Rec.709", is_float=True)
+    mapping.inputs["Rotation"].default_value = rotation
+    background.inputs["Strength"].default_value = strength
+    tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+
+
+def _sky() -> np.ndarray:
+    """A soft sky with a bright patch, (32, 64, 4)."""
+    v, u = np.mgrid[0:32, 0:64] / np.array([32.0, 64.0])[:, None, None]
+    pixels = np.ones((32, 64, 4), np.float32)
+    pixels[..., 0] = 0.2 + 0.3 * v
+    pixels[..., 1] = 0.3 + 0.1 * np.sin(2 * np.pi * u)
+    pixels[..., 2] = 0.6 - 0.4 * v
+    patch = np.exp(-(((u - 0.3) * 12) ** 2) - ((v - 0.3) * 8) ** 2)
+    pixels[..., :3] += 8.0 * patch[..., None] * np.array([1.0, 0.8, 0.5])
+    return pixels
+
+
+def _textured() -> bpy.types.Material:
+    """A diffuse material with a picture of few large texels, mapped with rotation and scale."""
+    data, tree, output = builders.material("Textured")
+    pixels = np.ones((6, 6, 4), np.float32)
+    pixels[..., :3] = np.random.default_rng(2).random((6, 6, 3)) * 0.8
+    texture, mapping = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeMapping")
+    place, diffuse = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeBsdfDiffuse")
+    texture.image = builders.image("Patches", pixels)
+    texture.interpolation = "Closest"
+    mapping.inputs["Rotation"].default_value = (0, 0, 0.4)
+    mapping.inputs["Scale"].default_value = (2, 3, 1)
+    tree.links.new(place.outputs["UV"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
+    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    return data
+
+
+def _ten_materials() -> list[bpy.types.Material]:
+    make = builders.shader_material
+    plastic = {"Base_Color": (0.1, 0.3, 0.7, 1), "Roughness": 0.3}
+    gold = {"Base_Color": (0.9, 0.6, 0.25, 1), "Metallic": 1.0, "Roughness": 0.3}
+    return [
+        make("BsdfDiffuse", "Red", Color=(0.7, 0.15, 0.1, 1)),
+        make("BsdfDiffuse", "Rough", Color=(0.6, 0.6, 0.5, 1), Roughness=0.8),
+        make("BsdfAnisotropic", "Glossy", Color=(0.7, 0.7, 0.7, 1), Roughness=0.3),
+        make("BsdfAnisotropic", "Mirror", Color=(0.9, 0.9, 0.9, 1), Roughness=0.0),
+        make("BsdfGlass", "Glass", Color=(0.9, 1.0, 0.95, 1), Roughness=0.0, IOR=1.5),
+        make("BsdfTranslucent", "Leaf", Color=(0.3, 0.7, 0.2, 1)),
+        make("BsdfPrincipled", "Plastic", **plastic),
+        make("BsdfPrincipled", "Gold", **gold),
+        make("Emission", "Lamp", Color=(1.0, 0.7, 0.4, 1), Strength=2.0),
+        _textured(),
+    ]
+
+
+def _instances() -> None:
+    """A ring of small cubes, instances of one collection."""
+    collection = bpy.data.collections.new("Parts")
+    data = builders.cube(half=0.15)
+    data.materials.append(builders.shader_material("BsdfDiffuse", "Part", Color=(0.5, 0.4, 0.8, 1)))
+    part = bpy.data.objects.new("Part", data)
+    part.rotation_euler = (0.4, 0.5, 0.6)
+    collection.objects.link(part)
+    for i in range(12):
+        angle = 2.0 * np.pi * i / 12
+        place = Matrix.Translation((3.2 * np.cos(angle), 2.4 * np.sin(angle), 0.3))
+        mirror = Matrix.Diagonal((-1 if i % 2 else 1, 1, 1 + 0.1 * i, 1))
+        empty = builders.link(None, f"Copy {i}", place @ mirror)
+        empty.instance_type, empty.instance_collection = "COLLECTION", collection
+
+
+def case_a_whole_scene() -> None:
+    """Ten materials, instances, an environment map and four lights."""
+    _environment(_sky(), (0.1, -0.2, 0.8), 0.6)
+    floor = builders.quad("Floor", 8.0)
+    floor.materials.append(
+        builders.shader_material("BsdfDiffuse", "Floor", Color=(0.5, 0.5, 0.45, 1))
+    )
+    builders.link(floor)
+    for i, material in enumerate(_ten_materials()):
+        ball = builders.sphere(f"Ball {i}", 0.45, 48, 24)
+        ball.materials.append(material)
+        builders.link(
+            ball, matrix=Matrix.Translation((1.1 * (i % 5 - 2), 1.2 * (i // 5) - 0.6, 0.5))
+        )
+    _instances()
+
+    def tilted(x: float, y: float, z: float, *angles: float) -> Matrix:
+        return Matrix.Translation((x, y, z)) @ Euler(angles).to_matrix().to_4x4()
+
+    soft = {"use_soft_falloff": False}
+    builders.light("POINT", tilted(-3, -2, 2, 0, 0, 0), energy=80.0, shadow_soft_size=0.4, **soft)
+    builders.light(
+        "SPOT", tilted(3, -3, 4, 0.6, 0.5, 0), energy=250.0, shadow_soft_size=0.3,
+        spot_size=1.0, spot_blend=0.3, color=(0.6, 0.8, 1.0), **soft,
+    )  # fmt: skip
+    builders.light("SUN", tilted(0, 0, 5, 0.5, -0.6, 0), energy=0.8, angle=0.3)
+    builders.light("AREA", tilted(0, 4, 3, -0.9, 0, 0), energy=120.0, size=2.0, size_y=1.0,
+                   shape="RECTANGLE", color=(1.0, 0.8, 0.6))  # fmt: skip
+    pose = Matrix.Translation((0, -7, 4)) @ Euler((1.05, 0, 0)).to_matrix().to_4x4()
+    builders.camera(pose, lens=40.0)
+    pictures = agreement.render_both(160, 120, 128, 128)
+    _check(agreement.compare(*pictures), mean=0.02, blocks=0.03, correlation=0.998)
+
+
+# Name -> shader node and its inputs. Both engines define these alike.
+_MATERIALS: dict[str, tuple[str, dict[str, Any]]] = {
+    "diffuse": ("BsdfDiffuse", {"Color": (0.8, 0.2, 0.1, 1)}),
+    "rough diffuse": ("BsdfDiffuse", {"Color": (0.8, 0.2, 0.1, 1), "Roughness": 0.8}),
+    "glossy": ("BsdfAnisotropic", {"Color": (0.8, 0.6, 0.2, 1), "Roughness": 0.3}),
+    "mirror": ("BsdfAnisotropic", {"Color": (0.8, 0.6, 0.2, 1), "Roughness": 0.0}),
+    "brushed": (
+        "BsdfAnisotropic",
+        {"Color": (0.8, 0.6, 0.2, 1), "Roughness": 0.3, "Anisotropy": 0.7, "Rotation": 0.1},
+    ),
+    "glass": ("BsdfGlass", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.0, "IOR": 1.5}),
+    "frosted": ("BsdfRefraction", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.2, "IOR": 1.3}),
+    "transparent": ("BsdfTransparent", {"Color": (0.5, 0.9, 0.8, 1)}),
+    "translucent": ("BsdfTranslucent", {"Color": (0.5, 0.9, 0.8, 1)}),
+    "sheen": ("BsdfSheen", {"Color": (0.5, 0.9, 0.8, 1), "Roughness": 0.4}),
+    "emission": ("Emission", {"Color": (0.5, 0.9, 0.8, 1), "Strength": 3.0}),
+}
+_PRINCIPLED: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "metal": {"Metallic": 1.0, "Roughness": 0.3},
+    "tinted metal": {"Metallic": 1.0, "Roughness": 0.2, "Specular_Tint": (0.2, 0.9, 0.4, 1)},
+    "plastic": {"Roughness": 0.1},
+    "high index": {"Roughness": 0.2, "IOR": 2.0},
+    "no specular": {"Roughness": 0.2, "Specular_IOR_Level": 0.0},
+    "tinted specular": {"Roughness": 0.2, "Specular_Tint": (1, 0.3, 0.1, 1)},
+    "glass": {"Roughness": 0.0, "Transmission_Weight": 1.0},
+    "half glass": {"Roughness": 0.1, "Transmission_Weight": 0.5},
+    "coat": {"Roughness": 0.6, "Coat_Weight": 1.0, "Coat_Roughness": 0.05},
+    "tinted coat": {"Coat_Weight": 0.8, "Coat_Roughness": 0.3, "Coat_Tint": (0.4, 0.8, 1, 1)},
+    "sheen": {"Sheen_Weight": 1.0, "Sheen_Roughness": 0.3, "Sheen_Tint": (1, 0.8, 0.6, 1)},
+    "glowing": {"Emission_Color": (1, 0.5, 0.2, 1), "Emission_Strength": 2.0},
+    "alpha": {"Alpha": 0.4},
+    "brushed": {"Metallic": 1.0, "Roughness": 0.3, "Anisotropic": 0.8},
+}
+
+
+def _stage(kind: str, inputs: dict[str, Any]) -> None:
+    """A ball over a floor, under an area light and a plain sky."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    _, _, background = builders.world()
+    background.inputs["Color"].default_value = (0.3, 0.4, 0.5, 1)
+    pose = Matrix.Translation((0, -5, 2.5)) @ Euler((1.24, 0, 0)).to_matrix().to_4x4()
+    builders.camera(pose)
+    floor = builders.quad("Floor", 6.0)
+    floor.materials.append(
+        builders.shader_material("BsdfDiffuse", "Floor", Color=(0.5, 0.45, 0.4, 1))
+    )
+    builders.link(floor)
+    ball = builders.sphere("Ball", 1.0, 64, 32)
+    ball.materials.append(builders.shader_material(kind, "Tested", **inputs))
+    builders.link(ball, matrix=Matrix.Translation((0, 0, 1.05)))
+    lamp = Matrix.Translation((2, -2, 4)) @ Euler((-0.5, 0.5, 0)).to_matrix().to_4x4()
+    builders.light("AREA", lamp, energy=150.0, size=1.5)
+
+
+def _each(materials: dict[str, tuple[str, dict[str, Any]]]) -> None:
+    """Compare every material, and name all that differ."""
+    failures = []
+    for name, (kind, inputs) in materials.items():
+        _stage(kind, inputs)
+        found = agreement.compare(*agreement.render_both(64, 48, 128, 128))
+        print(f"{name}: {found}", flush=True)
+        if np.abs(found.mean).max() > 0.02 or found.blocks > 0.03 or found.correlation < 0.998:
+            failures.append(f"{name}: {found}")
+    assert not failures, "\n".join(failures)
+
+
+def case_shaders_one_by_one() -> None:
+    _each(_MATERIALS)
+
+
+def case_principled_one_by_one() -> None:
+    base = {"Base_Color": (0.6, 0.3, 0.1, 1)}
+    _each({name: ("BsdfPrincipled", base | extra) for name, extra in _PRINCIPLED.items()})
+
+
+def case_lights_one_by_one() -> None:
+    """Every kind of light, alone, over a floor with a cube."""
+    soft = {"use_soft_falloff": False}
+    lights: list[tuple[str, dict[str, Any]]] = [
+        ("POINT", {"energy": 100.0, "shadow_soft_size": 0.2, **soft}),
+        ("POINT", {"energy": 100.0, "shadow_soft_size": 0.0}),
+        (
+            "SPOT",
+            {"energy": 100.0, "shadow_soft_size": 0.1, "spot_size": 1.2, "spot_blend": 0.3, **soft},
+        ),
+        ("SPOT", {"energy": 100.0, "shadow_soft_size": 0.0, "spot_size": 0.8, "spot_blend": 1.0}),
+        ("SUN", {"energy": 3.0, "angle": 0.2}),
+        ("SUN", {"energy": 3.0, "angle": 0.0}),
+        ("AREA", {"energy": 100.0, "size": 1.0}),
+        ("AREA", {"energy": 100.0, "size": 1.0, "size_y": 0.4, "shape": "ELLIPSE"}),
+        ("AREA", {"energy": 100.0, "size": 1.0, "shape": "RECTANGLE", "spread": 1.0}),
+    ]
+    for kind, properties in lights:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        builders.camera(Matrix.Translation((0, -6, 3)) @ Euler((1.1, 0, 0)).to_matrix().to_4x4())
+        for data, place in ((builders.quad("Floor", 5.0), 0.0), (builders.cube(half=0.5), 0.5)):
+            data.materials.append(builders.shader_material("BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1)))
+            builders.link(data, matrix=Matrix.Translation((place, 0, place)))
+        pose = Matrix.Translation((0, 0, 3)) @ Euler((0.3, 0.2, 0)).to_matrix().to_4x4()
+        builders.light(kind, pose, **properties)
+        found = agreement.compare(*agreement.render_both(64, 48, 96, 48))
+        print(kind, properties)
+        # A narrow spread has a bright middle, in which the same noise weighs more.
+        _check(found, 0.01, blocks=0.03 if "spread" in properties else 0.01, correlation=0.999)
+
+
+def case_environment_maps_turn_alike() -> None:
+    """A mirror shows where an environment map points, for every mapping of directions."""
+    for kind, rotation in (("POINT", (0.3, 0.2, 1.0)), ("TEXTURE", (0.3, 0.2, 1.0))):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        _environment(_sky(), rotation, 1.0)
+        tree = bpy.context.scene.world.node_tree
+        next(n for n in tree.nodes if n.bl_idname == "ShaderNodeMapping").vector_type = kind
+        builders.camera(Matrix.Translation((0, -4, 0)) @ Euler((1.5708, 0, 0)).to_matrix().to_4x4())
+        ball = builders.sphere("Ball", 1.0, 64, 32)
+        ball.materials.append(builders.shader_material("BsdfAnisotropic", Roughness=0.0))
+        builders.link(ball)
+        found = agreement.compare(*agreement.render_both(64, 48, 32, 32))
+        _check(found, mean=0.01, blocks=0.01, correlation=0.999)
