@@ -206,7 +206,7 @@ def test_a_stage_without_camera_is_seen_whole(up):
     assert (seen[:, 2] < 0).all()
     assert x0 < x.min() and x.max() < x1 and y0 < y.min() and y.max() < y1
     assert y.max() - y.min() > 0.3 * (y1 - y0)
-    np.testing.assert_allclose(matrix[:3, 1], [0, 0, 1] if up == "Z" else [0, 1, 0])
+    assert matrix[2 if up == "Z" else 1, 1] > 0.9  # the picture's up is the stage's
     assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
 
 

@@ -276,9 +276,19 @@ def test_lights_that_do_not_shine_are_said(body, kind):
     assert [path for path, _ in reported(imported, kind)] == ["/L"]
 
 
-def test_a_stage_without_lights_gets_a_sky():
-    scene, imported = load(f'{CAMERA}\ndef Mesh "M" {{ {QUAD} }}', plain=True)
-    assert list(scene.lights.values()) == [{"type": "dome", "radiance": [1, 1, 1]}]
+def test_a_stage_without_lights_gets_some():
+    body = f'def Camera "Camera" {{ }}\ndef Mesh "M" {{ {QUAD} }}'
+    scene, imported = load(body, plain=True)
+    sky, lamp = scene.lights.values()
+    assert sky["type"] == "dome"
+    # The lamp is behind the camera, above it and to its left.
+    x, y, z = transform(lamp)[:3, :3] @ [0, 0, 1]
+    assert x < -0.2
+    assert y > 0.2
+    assert z > 0.2
+    np.testing.assert_allclose(
+        transform(lamp)[:3, :3] @ transform(lamp)[:3, :3].T, np.eye(3), atol=1e-12
+    )
     assert len(reported(imported, usd.Kind.NOTE)) == 1
 
 

@@ -126,8 +126,10 @@ def run(options: argparse.Namespace) -> Status:
     if options.stats is not None and not options.stats.parent.is_dir():
         raise UsageError(f"{options.stats}: the folder {options.stats.parent} does not exist")
     reference = images.read_rgb(options.reference) if options.reference else None
-    first, last = options.frames or (None, None)
-    frames = [options.frame] if first is None else [float(f) for f in range(first, last + 1)]
+    frames = [options.frame]
+    if options.frames is not None:
+        first, last = options.frames
+        frames = [float(f) for f in range(first, last + 1)]
     collected = []
     with _Cancellation() as cancellation:
         for frame in frames:

@@ -263,7 +263,7 @@ def framing_camera(
     resolution: tuple[int, int] | None,
     z_up: bool,
 ) -> Frame:
-    """A camera that sees the whole stage, for stages without one: a 35 mm lens, from the front."""
+    """A camera that sees the whole stage, for stages without one: a 35 mm lens."""
     cache = UsdGeom.BBoxCache(time, list(purposes))
     box: Gf.Range3d = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
     low, high = np.array(box.GetMin()), np.array(box.GetMax())
@@ -275,10 +275,18 @@ def framing_camera(
     size, window = _size(window, settings, resolution)
     narrow = min(window[1], window[3])
     distance = radius / math.sin(math.atan(narrow))
-    toward = np.array([0.0, -1.0, 0.0] if z_up else [0.0, 0.0, 1.0])
-    up = np.array([0.0, 0.0, 1.0] if z_up else [0.0, 1.0, 0.0])
+    # From the front, a little from the right and above: no axis-aligned plane is seen edge-on.
+    turn, rise = math.radians(25), math.radians(20)
+    side, front, height = (
+        math.sin(turn) * math.cos(rise),
+        math.cos(turn) * math.cos(rise),
+        math.sin(rise),
+    )
+    toward = np.array([side, -front, height] if z_up else [side, height, front])
+    right = np.cross([0.0, 0.0, 1.0] if z_up else [0.0, 1.0, 0.0], toward)
+    right /= np.linalg.norm(right)
     matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = np.cross(up, toward), up, toward
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = right, np.cross(toward, right), toward
     matrix[:3, 3] = center + distance * toward
     camera = {"type": "perspective", "transform": flat(matrix), "window": list(window)}
     return Frame("framing camera", camera, size, _crop(size, settings))

@@ -92,10 +92,10 @@ class Geometry:
         if not is_invertible(matrix[None])[0]:
             self._report.left_out(prim, "a shape without size")
             return
-        if key not in self._data:
-            self._data[key] = make()
-        data = replace(self._data[key], slots=[prim])
-        data.left_handed = False
+        data = self._data.get(key)
+        if data is None:
+            data = self._data[key] = make()
+        data = replace(data, slots=[prim])
         self._add_shape(key, data, item, transforms)
 
     def _add_shape(

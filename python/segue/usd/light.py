@@ -202,7 +202,8 @@ class Lights:
         height = float(self._get(prim, "inputs:height"))
         area = rect_area(width, height, matrix)
         if not area > 0:
-            return self._no_area(prim)
+            self._no_area(prim)
+            return None
         description = {
             "type": "rect",
             "width": width,
@@ -221,7 +222,8 @@ class Lights:
         radius = float(self._get(prim, "inputs:radius"))
         area = disk_area(radius, matrix)
         if not area > 0:
-            return self._no_area(prim)
+            self._no_area(prim)
+            return None
         return {
             "type": "disk",
             "radius": radius,
@@ -240,7 +242,8 @@ class Lights:
             # directions (Cauchy); normalised, A cancels.
             intensity = level / 4 * (1.0 if normalized else area)
             if not intensity.any():
-                return self._no_area(prim)
+                self._no_area(prim)
+                return None
             return {"type": "point", "intensity": intensity.tolist(), "transform": flat(matrix)}
         return {
             "type": "sphere",
@@ -259,7 +262,8 @@ class Lights:
             self._report.unsupported(prim, "a line light", f"a cylinder of radius {radius:g}")
         area = cylinder_area(radius, length, matrix)
         if not area > 0:
-            return self._no_area(prim)
+            self._no_area(prim)
+            return None
         return {
             "type": "cylinder",
             "radius": radius,
@@ -333,6 +337,31 @@ class Lights:
                 "focus_tint": tint,
             }
         }
+
+
+def add_default_lights(scene: Scene, camera: np.ndarray, gain: float) -> None:
+    """Lights for a stage that has none: a grey sky, and a soft lamp over the camera's shoulder.
+
+    Args:
+        scene: what they are added to.
+        camera: (4, 4) camera to world.
+        gain: factor on every radiance.
+    """
+    scene.add_light("default sky", {"type": "dome", "radiance": [0.4 * gain] * 3})
+    c, s = math.cos(math.radians(35)), math.sin(math.radians(35))
+    # Both turns take the camera's direction of view, -Z: to the right, then downwards.
+    to_right = np.array([[c, 0, -s, 0], [0, 1, 0, 0], [s, 0, c, 0], [0, 0, 0, 1.0]])
+    down = np.array([[1.0, 0, 0, 0], [0, c, s, 0], [0, -s, c, 0], [0, 0, 0, 1]])
+    lamp = camera @ to_right @ down
+    scene.add_light(
+        "default lamp",
+        {
+            "type": "distant",
+            "angle": math.radians(10),
+            "irradiance": [2 * gain] * 3,
+            "transform": flat(lamp),
+        },
+    )
 
 
 def stage_is_z_up(stage: Usd.Stage) -> bool:

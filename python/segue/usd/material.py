@@ -9,7 +9,7 @@ from ..scene import Scene
 from ._pxr import Sdf, Usd, UsdShade
 from .color_space import check_color_space
 from .report import Report
-from .texture import COLOR_READERS, Textures, floats, source
+from .texture import COLOR_READERS, Rgba, Textures, floats, source
 
 #: A parameter of the ABI: a number, a colour or a texture's output.
 Value = Any
@@ -122,9 +122,8 @@ class _Inputs:
             )
             return self.number(name, 1.0)
         read = self._textures.uv_texture(node, threshold=threshold, channel=output)
-        if read.constant is not None:
-            channel = {"r": 0, "rgb": 0, "g": 1, "b": 2, "a": 3}[output]
-            return 1.0 if read.constant[channel] >= threshold else 0.0
+        if isinstance(read, Rgba):
+            return 1.0 if read.channel(output) >= threshold else 0.0
         self.primvars.add(read.coordinates.primvar)
         return {"texture": read.id, "channel": "r"}
 
@@ -141,7 +140,7 @@ class _Inputs:
             )
             return None
         read = self._textures.uv_texture(node, normal_map=True)
-        if read.constant is not None:
+        if isinstance(read, Rgba):
             return None
         self.primvars.add(read.coordinates.primvar)
         return {"texture": read.id, "uv": read.coordinates.primvar}
@@ -173,10 +172,8 @@ class _Inputs:
     def _from_image(self, node: UsdShade.Shader, output: str, plain: str) -> Value:
         read = self._textures.uv_texture(node)
         channel = output if output in ("r", "g", "b", "a") else plain
-        if read.constant is not None:
-            if channel == "rgb":
-                return list(read.constant[:3])
-            return read.constant["rgba".index(channel)]
+        if isinstance(read, Rgba):
+            return list(read[:3]) if channel == "rgb" else read.channel(channel)
         if channel == "a" and not read.has_alpha:
             return 1.0
         self.primvars.add(read.coordinates.primvar)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from ..scene import Attribute
 from . import primvar
 from ._pxr import Usd, UsdGeom, UsdShade
 from .report import Report
+
+if TYPE_CHECKING:
+    from .subdivided import Subdivided
 
 _SMOOTH_SCHEMES = ("catmullClark", "loop")
 
@@ -22,6 +26,7 @@ class MeshData:
     Attributes:
         slots: the prims whose bindings are the material slots: the mesh, then its subsets.
         face_slots: slot of each face, or None: all are the mesh's own.
+        subdivided: how values on the control cage become values on this mesh, if it has one.
     """
 
     points: np.ndarray
@@ -34,10 +39,13 @@ class MeshData:
     attributes: list[Attribute] = field(default_factory=list)
     slots: list[Usd.Prim] = field(default_factory=list)
     face_slots: np.ndarray | None = None
+    subdivided: Subdivided | None = None
 
     @property
     def elements(self) -> primvar.Elements:
-        """How many faces, points and corners there are."""
+        """How many faces, points and corners there are, on the cage if there is one."""
+        if self.subdivided is not None:
+            return self.subdivided.elements
         return primvar.Elements(len(self.face_counts), len(self.points), len(self.face_indices))
 
 
@@ -69,8 +77,12 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, report: Report) -> MeshDat
         if len(inside) < len(holes):
             report.warning(prim, "holeIndices out of range", "they are ignored")
         data.holes = np.unique(inside).astype(np.uint32)
-    _read_normals(mesh, time, data, report)
     _read_subsets(prim, time, data, report)
+    if mesh.GetSubdivisionSchemeAttr().Get(time) in _SMOOTH_SCHEMES:
+        from .subdivided import Subdivided  # which needs this module's MeshData
+
+        return Subdivided(mesh, time, data, report).data()
+    _read_normals(mesh, time, data, report)
     return data
 
 
@@ -106,19 +118,9 @@ def _fault(points: np.ndarray, counts: np.ndarray, indices: np.ndarray) -> str:
 
 
 def _read_normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, data: MeshData, report: Report) -> None:
-    """Authored normals of polygon meshes; smooth ones where a subdivision scheme asks for them."""
+    """Authored normals. A bilinear surface is its cage, where they do not count: it is flat."""
     prim = mesh.GetPrim()
-    scheme = mesh.GetSubdivisionSchemeAttr().Get(time)
-    if scheme in _SMOOTH_SCHEMES:
-        # By UsdGeomMesh authored normals do not count on a subdivision surface.
-        data.normals = smooth_normals(data)
-        report.unsupported(
-            prim,
-            f"subdivision ({scheme})",
-            "its control cage is drawn with smooth normals",
-        )
-        return
-    if scheme != UsdGeom.Tokens.none:  # bilinear: the cage is the surface, and it is flat
+    if mesh.GetSubdivisionSchemeAttr().Get(time) != UsdGeom.Tokens.none:
         return
     values = None
     normals = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
@@ -235,6 +237,8 @@ def add_attributes(
     """Adds those of the named primvars that were found and fit the mesh."""
     for name, found in primvars.items():
         values = primvar.read(found, time, data.elements, report) if found else None
+        if values and data.subdivided is not None:
+            values = data.subdivided.values(values)
         attribute = primvar.attribute(name, values) if values else None
         if attribute is not None:
             data.attributes.append(attribute)

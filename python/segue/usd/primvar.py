@@ -42,11 +42,16 @@ class Elements:
 
 @dataclass(frozen=True)
 class Values:
-    """A primvar's values with their indices, checked against the mesh."""
+    """A primvar's values with their indices, checked against the mesh.
+
+    Attributes:
+        is_varying: values at vertices that a subdivision surface interpolates linearly.
+    """
 
     data: np.ndarray
     interpolation: str
     indices: np.ndarray | None
+    is_varying: bool = False
 
     def flattened(self) -> np.ndarray:
         """One value for each element."""
@@ -95,7 +100,7 @@ def read(
             "it is ignored",
         )
         return None
-    return Values(data, interpolation, indices)
+    return Values(data, interpolation, indices, primvar.GetInterpolation() == "varying")
 
 
 def find(prim: Usd.Prim, name: str) -> UsdGeom.Primvar | None:

@@ -44,9 +44,8 @@ def shape_of(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
         return ("plane",), plane, _plane_matrix(get)
     if kind in ("Cylinder", "Cone"):
         radius, height = float(get("radius")), float(get("height"))
-        make = cylinder if kind == "Cylinder" else cone
         matrix = _matrix(get("axis"), [radius, radius, 0.5 * height])
-        return (kind.lower(),), make, matrix
+        return (kind.lower(),), cylinder if kind == "Cylinder" else cone, matrix
     if kind in ("Cylinder_1", "Capsule", "Capsule_1"):
         height = float(get("height"))
         if kind == "Capsule":

@@ -7,12 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ..errors import SegueError
 from ..scene import Scene
 from ._pxr import Tf, Usd, UsdGeom
 from .camera import Frame, exposure_scale, find_camera, framing_camera, read_camera, read_settings
 from .geometry import Geometry, geometry_light_targets
-from .light import Lights, stage_is_z_up
+from .light import Lights, add_default_lights, stage_is_z_up
 from .material import Materials
 from .report import Report
 from .texture import Textures
@@ -122,7 +124,8 @@ def load(
         report.note("", "the stage has no camera", "one was made that sees all of it")
     target.set_camera(shot.name, shot.camera)
 
-    counts = _fill(target, stage, time, purposes, report, gain, z_up)
+    camera_to_world = np.reshape(shot.camera["transform"], (4, 4))
+    counts = _fill(target, stage, time, purposes, report, gain, z_up, camera_to_world)
     value = None if time.IsDefault() or time.IsEarliestTime() else time.GetValue()
     return Imported(target, shot.name, shot.resolution, shot.crop, value, report, counts)
 
@@ -135,6 +138,7 @@ def _fill(
     report: Report,
     gain: float,
     z_up: bool,
+    camera: np.ndarray,
 ) -> dict[str, int]:
     """Adds the stage's lights and geometry; returns how many of what."""
     textures = Textures(scene, time, report)
@@ -151,8 +155,8 @@ def _fill(
         else:
             geometry.add(item)
     if not lights.count and not geometry.emitters:
-        report.note("", "the stage has no light", "a white sky of radiance 1 was added")
-        scene.add_light("white sky", {"type": "dome", "radiance": [gain] * 3})
+        report.note("", "the stage has no light", "a grey sky and a lamp by the camera were added")
+        add_default_lights(scene, camera, gain)
     return {"gprims": len(items), "lights": lights.count, "emissive gprims": geometry.emitters}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,23 @@ from .report import Report
 COLOR_READERS = tuple(
     f"UsdPrimvarReader_{t}" for t in ("float", "float2", "float3", "float4", "vector", "point")
 )
-#: What is used for a picture that cannot be read and has no authored fallback.
-MISSING = (0.5, 0.5, 0.5, 1.0)
+
+
+class Rgba(NamedTuple):
+    """The value that is used instead of a picture that cannot be read."""
+
+    r: float
+    g: float
+    b: float
+    a: float
+
+    def channel(self, name: str) -> float:
+        """The component of an output `r`, `g`, `b` or `a`; the red one of `rgb`."""
+        return self["rgba".index(name[0])]
+
+
+#: Where nothing is authored.
+MISSING = Rgba(0.5, 0.5, 0.5, 1.0)
 
 Source = tuple[UsdShade.Shader, str]
 
@@ -83,13 +98,11 @@ class ImageTexture:
         id: the texture.
         coordinates: its primvar, which the mesh has to bring.
         has_alpha: its alpha is not 1 everywhere.
-        constant: the value used instead of a picture that could not be read.
     """
 
     id: int
-    coordinates: Coordinates | None
+    coordinates: Coordinates
     has_alpha: bool
-    constant: tuple[float, float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +124,7 @@ class Textures:
         self._time = time
         self._report = report
         self._images: dict[tuple, _Loaded | str] = {}
-        self._textures: dict[tuple, ImageTexture] = {}
+        self._textures: dict[tuple, ImageTexture | Rgba] = {}
 
     def uv_texture(
         self,
@@ -119,8 +132,8 @@ class Textures:
         normal_map: bool = False,
         threshold: float | None = None,
         channel: str = "",
-    ) -> ImageTexture:
-        """The texture of a UsdUVTexture node.
+    ) -> ImageTexture | Rgba:
+        """The texture of a UsdUVTexture node, or the value that stands in for it.
 
         Args:
             shader: the node.
@@ -158,7 +171,7 @@ class Textures:
 
     def _uv_texture(
         self, shader: UsdShade.Shader, normal_map: bool, threshold: float | None, channel: str
-    ) -> ImageTexture:
+    ) -> ImageTexture | Rgba:
         prim, time = shader.GetPrim(), self._time
         scale = floats(value(shader, "scale", time, 1), (1.0, 1.0, 1.0, 1.0))
         bias = floats(value(shader, "bias", time, 0), (0.0, 0.0, 0.0, 0.0))
@@ -171,13 +184,9 @@ class Textures:
             loaded = self._load(file_attribute, asset, space, mask)
         if isinstance(loaded, str):
             fallback = value(shader, "fallback", time, None)
-            numbers = MISSING if fallback is None else tuple(floats(fallback, (0, 0, 0, 1)))
             word = "its fallback value is used" if fallback is not None else "grey 0.5 is used"
             self._report.warning(prim, loaded, word)
-            texture = self._scene.add_texture(
-                str(prim.GetPath()), {"type": "constant", "value": list(numbers)}
-            )
-            return ImageTexture(texture, None, numbers[3] != 1, numbers)
+            return MISSING if fallback is None else Rgba(*floats(fallback, (0, 0, 0, 1)))
         if mask is not None:
             scale, bias = [1.0] * 4, [0.0] * 4
         elif normal_map and loaded.is_8_bit and scale[:3] == [1, 1, 1] and bias[:3] == [0, 0, 0]:
@@ -189,7 +198,7 @@ class Textures:
             scale, bias = [2.0, 2.0, 2.0, 1.0], [-1.0, -1.0, -1.0, 0.0]
         coordinates = self._coordinates(shader)
         wraps = loaded.wrap.split(",") if loaded.wrap else []
-        texture = {
+        texture: dict[str, Any] = {
             "type": "image",
             "image": loaded.id,
             "uv": coordinates.primvar,
