@@ -167,15 +167,7 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
 
 def _read_passes(render: Any, frame: Frame) -> dict[str, np.ndarray]:
     """Every pass of the frame, by Blender's names."""
-    pixels = {}
-    for render_pass in frame.passes:
-        values = render.read_pass(render_pass.source)
-        if render_pass.background is not None:
-            values = np.where(
-                np.isfinite(values) & (values > 0), values, np.float32(render_pass.background)
-            )
-        pixels[render_pass.name] = values
-    return pixels
+    return {render_pass.name: render.read_pass(render_pass.source) for render_pass in frame.passes}
 
 
 def _report(engine: SegueRenderEngine, log: ExportLog, info: dict[str, Any]) -> None:

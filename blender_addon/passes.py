@@ -17,8 +17,7 @@ class RenderPass:
 
     `source` is Segue's name, `name` Blender's, `channels` names one letter a channel, `kind` is
     Blender's pass type, and `switch` the view layer property that asks for it (of the view layer
-    itself, or of its `segue` group when `custom`). `background` replaces the values of pixels
-    where nothing was hit.
+    itself, or of its `segue` group when `custom`).
     """
 
     source: str
@@ -27,13 +26,11 @@ class RenderPass:
     kind: str
     switch: str | None = None
     custom: bool = False
-    background: float | None = None
 
 
 PASSES: tuple[RenderPass, ...] = (
     RenderPass("Combined", "Combined", "RGBA", "COLOR"),
-    # Blender marks "nothing there" by a depth of 1e10, which its compositor and mist rely on.
-    RenderPass("Depth", "Depth", "Z", "VALUE", "use_pass_z", background=1e10),
+    RenderPass("Depth", "Depth", "Z", "VALUE", "use_pass_z"),
     RenderPass("Position", "Position", "XYZ", "VECTOR", "use_pass_position"),
     RenderPass("Normal", "Normal", "XYZ", "VECTOR", "use_pass_normal"),
     RenderPass("UV", "UV", "UVA", "VECTOR", "use_pass_uv"),
