@@ -159,15 +159,15 @@ def agave(rng: np.random.Generator) -> tuple[Array, Array, Array]:
 def build(folder: Path) -> Scene:
     """The scene; its textures go into the folder."""
     blues = [
-        (0.16, 0.55, 0.60),
-        (0.20, 0.62, 0.66),
-        (0.30, 0.70, 0.72),
-        (0.12, 0.47, 0.56),
-        (0.45, 0.78, 0.78),
+        (0.35, 0.72, 0.74),
+        (0.42, 0.77, 0.78),
+        (0.52, 0.82, 0.82),
+        (0.28, 0.64, 0.70),
+        (0.66, 0.87, 0.86),
     ]
     textures.save_colour(folder, "mosaic", textures.tiles(512, 8, blues, (0.80, 0.84, 0.82), 21))
     textures.save_colour(folder, "stucco", textures.plaster(256, (0.86, 0.47, 0.46), 0.035, 8))
-    textures.save_colour(folder, "deck", textures.plaster(256, (0.80, 0.74, 0.65), 0.05, 9))
+    textures.save_colour(folder, "deck", textures.plaster(256, (0.72, 0.67, 0.60), 0.05, 9))
     day = textures.sky(256, (0.16, 0.33, 0.72), (0.62, 0.72, 0.86), (0.30, 0.27, 0.23), 0.6, 4)
     textures.save_radiance(folder, "day_sky", day)
     scene = Scene(

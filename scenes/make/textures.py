@@ -144,6 +144,8 @@ def save_radiance(folder: Path, name: str, image: Array) -> None:
 
 
 def _write(path: Path, spec: OpenImageIO.ImageSpec, image: Array) -> None:
+    # A date of its own would make every run's file differ.
+    spec.attribute("DateTime", "2000:01:01 00:00:00")
     out = OpenImageIO.ImageOutput.create(str(path))
     if out is None or not out.open(str(path), spec):
         raise OSError(f"cannot write {path}: {OpenImageIO.geterror()}")
