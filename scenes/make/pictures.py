@@ -32,13 +32,18 @@ def picture(name: str, options: list[str], quality: int) -> Path:
 
 
 def main() -> None:
-    """Renders every named picture, or all; further options go to `segue render`."""
+    """Renders every named picture, or all."""
     parser = argparse.ArgumentParser(
         prog="python -m scenes.make.pictures", description=main.__doc__
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}")
     parser.add_argument("--quality", type=int, default=88, help="JPEG quality (default: 88)")
-    given, options = parser.parse_known_args()
+    parser.add_argument("--time", type=float, default=60, help="seconds for each (default: 60)")
+    parser.add_argument("--integrator", metavar="NAME", help="method (default: the engine's)")
+    given = parser.parse_args()
+    options = ["--time", str(given.time)]
+    if given.integrator:
+        options += ["--integrator", given.integrator]
     for name in given.names or NAMES:
         path = picture(name, options, given.quality)
         print(f"{path}  {path.stat().st_size / 1000:.0f} kB")
