@@ -82,12 +82,17 @@ def fluted_column(radius: float, height: float) -> Mesh:
 
 def build(folder: Path) -> Scene:
     """The scene; its textures go into the folder."""
-    speckle = np.clip(textures.noise((512, 512), 3, 0.3) - 1.9, 0, 1) * 1.4
-    terrazzo = textures.ramp(speckle, [(0, (0.93, 0.90, 0.86)), (1, (0.62, 0.36, 0.30))])
-    textures.save_colour(folder, "speckle", terrazzo)
+    terrazzo = textures.terrazzo(
+        384,
+        (0.90, 0.87, 0.82),
+        [(0.78, 0.45, 0.36), (0.33, 0.46, 0.42), (0.86, 0.68, 0.40), (0.55, 0.50, 0.47)],
+        420,
+        3,
+    )
+    textures.save_colour(folder, "terrazzo", terrazzo)
     scene = Scene("still_life", "Plain shapes under two soft boxes and a dim dome.")
     paper = scene.matte("Paper", (0.78, 0.52, 0.42))
-    cream = scene.plastic("Cream", Texture("speckle.jpg", (2.5, 2.5)), 0.45)
+    cream = scene.plastic("Cream", Texture("terrazzo.jpg", (3.0, 2.1)), 0.45)
     sage = scene.plastic("Sage", (0.22, 0.36, 0.29), 0.5)
     coral = scene.plastic("Coral", (0.80, 0.20, 0.13), 0.25)
     mustard = scene.plastic("Mustard", (0.80, 0.47, 0.09), 0.35)

@@ -101,6 +101,31 @@ def marble(size: int, stops: list[tuple[float, tuple[float, float, float]]], see
     return ramp(value, stops)
 
 
+def terrazzo(
+    size: int,
+    ground: tuple[float, float, float],
+    palette: list[tuple[float, float, float]],
+    chips: int,
+    seed: int,
+) -> Array:
+    """Chips of stone, convex polygons of many sizes, set in a ground."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[0:size, 0:size] / size
+    image = np.tile(np.array(ground), (size, size, 1))
+    for radius in np.sort(rng.lognormal(-4.5, 0.5, chips))[::-1]:
+        at = rng.uniform(0, 1, 2)
+        # Wrapped around, so that the image tiles.
+        dx, dy = (x - at[0] + 0.5) % 1 - 0.5, (y - at[1] + 0.5) % 1 - 0.5
+        angle = np.sort(rng.uniform(0, 2 * np.pi, 6))
+        reach = radius * rng.uniform(0.7, 1.2, 6)
+        inside = np.all(
+            [np.cos(a) * dx + np.sin(a) * dy < r for a, r in zip(angle, reach, strict=True)], 0
+        )
+        inside &= np.hypot(dx, dy) < 2.2 * radius
+        image[inside] = palette[rng.integers(len(palette))]
+    return image
+
+
 def sky(
     width: int,
     zenith: tuple[float, float, float],
