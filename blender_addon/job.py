@@ -184,7 +184,7 @@ def _finish(engine: SegueRenderEngine, frame: Frame, stats: dict[str, Any]) -> N
     mebibytes = stats.get("peak_memory_bytes", 0) / 2**20
     engine.update_memory_stats(memory_used=mebibytes, memory_peak=mebibytes)
     engine.update_stats(
-        frame.layer, f"{stats.get('samples', 0)} samples in {stats.get('seconds', 0.0):.2f} s"
+        frame.layer, f"{stats.get('samples', 0):.0f} samples in {stats.get('seconds', 0.0):.2f} s"
     )
     if stats.get("non_finite"):
         engine.report(
