@@ -203,7 +203,7 @@ fn bad_triangles_and_instances_are_dropped_and_counted() {
     for placed in [1, 2] {
         let mut instances = vec![(0, Affine3A::IDENTITY); placed];
         instances.extend([(0, singular), (0, not_finite), (0, Affine3A::ZERO)]);
-        let accel = build(&[mesh.clone()], &instances);
+        let accel = build(std::slice::from_ref(&mesh), &instances);
         let dropped = Dropped { non_finite_triangles: 4, degenerate_triangles: 3, singular_instances: 3 };
         assert_eq!(accel.dropped(), dropped);
         let hit = accel.closest(&ray).unwrap();
@@ -218,7 +218,7 @@ fn nothing_at_all() {
     let empty = (vec![], vec![]);
     for accel in [
         build(&[], &[]),
-        build(&[empty.clone()], &[(0, Affine3A::IDENTITY)]),
+        build(std::slice::from_ref(&empty), &[(0, Affine3A::IDENTITY)]),
         build(&[empty], &[(0, Affine3A::IDENTITY); 3]),
     ] {
         assert_eq!(accel.closest(&Ray::new(Vec3::ZERO, Vec3::X)), None);
