@@ -42,8 +42,8 @@ test: lint test-rust test-c test-python test-blender-current
 lint: all
 	$(CARGO) fmt --check
 	$(CARGO) clippy --release --locked --all-targets -- -D warnings
-	$(VENV)/bin/ruff check python tests blender_addon scenes
-	$(VENV)/bin/ruff format --check python tests blender_addon scenes
+	$(VENV)/bin/ruff check python tests blender_addon scenes benches
+	$(VENV)/bin/ruff format --check python tests blender_addon scenes benches
 
 test-rust:
 	$(CARGO) test --release --locked

@@ -8,10 +8,12 @@ from __future__ import annotations
 import time
 
 import numpy as np
-
 import segue
 
-CAMERA = {"window": [-0.5, 0.5, -0.5, 0.5], "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1]}
+CAMERA = {
+    "window": [-0.5, 0.5, -0.5, 0.5],
+    "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1],
+}
 
 
 def heightfield(cells: int) -> tuple[np.ndarray, np.ndarray]:
