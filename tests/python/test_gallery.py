@@ -47,7 +47,7 @@ def is_glass(mesh: UsdGeom.Mesh) -> bool:
 
 def test_there_is_a_gallery() -> None:
     """An empty folder must not pass for a good one."""
-    assert len(STAGES) >= 3
+    assert len(STAGES) >= 7
 
 
 def test_frame(stage: Usd.Stage) -> None:
@@ -148,6 +148,16 @@ def test_something_shines(stage: Usd.Stage) -> None:
 def test_stage_is_small(path: Path) -> None:
     """Stages are read by people and by diff: at most 1.5 MB each."""
     assert path.stat().st_size <= 1_500_000
+
+
+@pytest.mark.parametrize("path", STAGES, ids=lambda path: path.stem)
+def test_stage_is_shown(path: Path) -> None:
+    """Each stage has its picture, below 300 kB, and its row in the table."""
+    picture = FOLDER / "pictures" / f"{path.stem}.jpg"
+    assert 0 < picture.stat().st_size <= 300_000
+    table = (FOLDER / "README.md").read_text()
+    assert f'"pictures/{path.stem}.jpg"' in table
+    assert f"({path.name})" in table
 
 
 def test_textures_are_small() -> None:
