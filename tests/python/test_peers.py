@@ -18,7 +18,7 @@ from segue import images, usd
 pytestmark = pytest.mark.usefixtures("engine")
 
 # Samples a pixel, and the largest difference of the means in percent. Where light comes through
-# glass or a gap, a path tracer finds it rarely, and the references' own means are known to 0.6 % only.
+# glass or a gap, a path tracer finds it rarely, and the references' own means are known to 0.6 %.
 SCENES = {
     "cornell": (32, 0.5),
     "glossy_box": (64, 0.5),
