@@ -9,11 +9,12 @@ import numpy as np
 
 from ..errors import BadSceneError
 from ..scene import Scene
-from . import mesh as meshes
 from . import primvar
 from ._pxr import Sdf, Usd, UsdGeom, UsdLux
 from .light import Lights, is_normalized, radiance
 from .material import GREY, Materials, Surface, with_emission
+from .mesh import add_attributes, read_mesh
+from .mesh_data import MeshData, area
 from .report import Report
 from .shapes import shape_of
 from .transform import is_invertible
@@ -53,7 +54,7 @@ class Geometry:
         self._report = report
         self._gain = gain
         self._meshes: dict[Any, int | None] = {}
-        self._data: dict[Any, meshes.MeshData | None] = {}
+        self._data: dict[Any, MeshData | None] = {}
         self._count = 0
         self.emitters = 0
         #: Geometry that a GeometryLight makes a light, by path of the gprim.
@@ -77,7 +78,7 @@ class Geometry:
         if prim.IsA(UsdGeom.Mesh):
             key: Any = _definition(prim)
             if key not in self._data:
-                self._data[key] = meshes.read_mesh(UsdGeom.Mesh(prim), self._time, self._report)
+                self._data[key] = read_mesh(UsdGeom.Mesh(prim), self._time, self._report)
             data = self._data[key]
             if data is not None:
                 self._add_shape(key, data, item, item.transforms)
@@ -98,9 +99,7 @@ class Geometry:
         data = replace(data, slots=[prim])
         self._add_shape(key, data, item, transforms)
 
-    def _add_shape(
-        self, key: Any, data: meshes.MeshData, item: Item, transforms: np.ndarray
-    ) -> None:
+    def _add_shape(self, key: Any, data: MeshData, item: Item, transforms: np.ndarray) -> None:
         prim = item.prim
         # Inside an instance the subsets are those of the proxy that the bindings are asked of.
         slots = _slots_of(prim, data)
@@ -125,9 +124,7 @@ class Geometry:
                 object_index=self._count,
             )
 
-    def _mesh(
-        self, key: Any, data: meshes.MeshData, prim: Usd.Prim, needed: frozenset[str]
-    ) -> int | None:
+    def _mesh(self, key: Any, data: MeshData, prim: Usd.Prim, needed: frozenset[str]) -> int | None:
         """The mesh with the primvars that its materials need, added once for each set of them."""
         found = {name: primvar.find(prim, name) for name in sorted(needed)}
         origins = tuple(
@@ -146,7 +143,7 @@ class Geometry:
                 f"its material needs the primvar {', '.join(missing)}, which it does not have",
                 "0 is used",
             )
-        meshes.add_attributes(complete, found, self._time, self._report)
+        add_attributes(complete, found, self._time, self._report)
         try:
             number = self._scene.add_mesh(
                 str(prim.GetPath()),
@@ -166,7 +163,7 @@ class Geometry:
         self._meshes[full_key] = number
         return number
 
-    def _surface(self, slot: Usd.Prim, prim: Usd.Prim, data: meshes.MeshData) -> Surface:
+    def _surface(self, slot: Usd.Prim, prim: Usd.Prim, data: MeshData) -> Surface:
         """The surface of a material slot: what is bound, else displayColor and displayOpacity."""
         surface = self._materials.bound_surface(slot)
         if surface is not None:
@@ -175,7 +172,7 @@ class Geometry:
         opacity = self._display(prim, "displayOpacity", data, 1)
         return self._materials.display(color, opacity)
 
-    def _display(self, prim: Usd.Prim, name: str, data: meshes.MeshData, default: Any) -> Any:
+    def _display(self, prim: Usd.Prim, name: str, data: MeshData, default: Any) -> Any:
         """A display primvar: its value where it is constant, None where it varies."""
         found = primvar.find(prim, name)
         values = primvar.read(found, self._time, data.elements, self._report) if found else None
@@ -196,7 +193,7 @@ class Geometry:
         return UsdLux.LightAPI(prim)
 
     def _emission(
-        self, light: UsdLux.LightAPI | None, data: meshes.MeshData, transforms: np.ndarray
+        self, light: UsdLux.LightAPI | None, data: MeshData, transforms: np.ndarray
     ) -> list[tuple[np.ndarray, np.ndarray | None]]:
         """The instances with the radiance of their light: one group unless it is normalised."""
         if light is None:
@@ -206,9 +203,8 @@ class Geometry:
             return [(transforms, level)]
         groups: dict[float, list[np.ndarray]] = {}
         for matrix in transforms:
-            area = meshes.area(data, matrix)
-            groups.setdefault(float(f"{area:.9g}"), []).append(matrix)
-        return [(np.stack(g), level / area if area > 0 else level) for area, g in groups.items()]
+            groups.setdefault(float(f"{area(data, matrix):.9g}"), []).append(matrix)
+        return [(np.stack(g), level / size if size > 0 else level) for size, g in groups.items()]
 
     def _material(
         self, surface: Surface, light: UsdLux.LightAPI | None, level: np.ndarray | None
@@ -231,7 +227,7 @@ def _definition(prim: Usd.Prim) -> Sdf.Path:
     return prim.GetPrimInPrototype().GetPath() if prim.IsInstanceProxy() else prim.GetPath()
 
 
-def _slots_of(prim: Usd.Prim, data: meshes.MeshData) -> list[Usd.Prim]:
+def _slots_of(prim: Usd.Prim, data: MeshData) -> list[Usd.Prim]:
     """The prims whose bindings are the slots, below this prim rather than the one first read."""
     first = data.slots[0].GetPath()
     if first == prim.GetPath():

@@ -33,7 +33,7 @@ def radiance(light: UsdLux.LightAPI, time: Usd.TimeCode) -> np.ndarray:
         color *= np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
     intensity = float(light.GetIntensityAttr().Get(time))
     exposure = float(light.GetExposureAttr().Get(time))
-    return intensity * 2.0**exposure * color
+    return intensity * np.exp2(exposure) * color
 
 
 def is_normalized(light: UsdLux.LightAPI, time: Usd.TimeCode) -> bool:

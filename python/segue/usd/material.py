@@ -8,8 +8,9 @@ from typing import Any
 from ..scene import Scene
 from ._pxr import Sdf, Usd, UsdShade
 from .color_space import check_color_space
+from .inputs import Inputs, is_node
 from .report import Report
-from .texture import COLOR_READERS, Rgba, Textures, floats, source
+from .texture import COLOR_READERS, Rgba, Textures
 
 #: A parameter of the ABI: a number, a colour or a texture's output.
 Value = Any
@@ -72,25 +73,23 @@ def is_constant(v: Value, number: float) -> bool:
     return all(c == number for c in v) if isinstance(v, (list, tuple)) else v == number
 
 
-class _Inputs:
+class _Node:
     """Reads the inputs of one UsdPreviewSurface node and remembers the primvars they need."""
 
-    def __init__(
-        self, node: UsdShade.Shader, textures: Textures, time: Usd.TimeCode, report: Report
-    ) -> None:
+    def __init__(self, node: UsdShade.Shader, textures: Textures, inputs: Inputs) -> None:
         self.node = node
         self.primvars: set[str] = set()
         self._textures = textures
-        self._time = time
-        self._report = report
+        self._inputs = inputs
+        self._report = inputs.report
 
     def constant(self, name: str, default: Any) -> Any:
         """An input that cannot be textured."""
-        found = source(self.node, name, self._time)
-        if isinstance(found, tuple):
-            self._report.unsupported(self.node.GetPrim(), f"a texture on {name}", f"{default}")
-            return default
-        return default if found is None else found
+        return self._inputs.value(self.node, name, default)
+
+    def threshold(self) -> float:
+        """The value of opacity from which the surface is there; 0: no such limit."""
+        return self._inputs.floats(self.node, "opacityThreshold", (0.0,))[0]
 
     def number(self, name: str, default: float) -> Value:
         """A number, possibly a texture's channel."""
@@ -107,13 +106,13 @@ class _Inputs:
 
     def is_textured(self, name: str) -> bool:
         """Whether an input is fed by a node."""
-        return isinstance(source(self.node, name, self._time), tuple)
+        return is_node(self._inputs.source(self.node, name))
 
     def mask(self, name: str, threshold: float) -> Value:
         """1 where the input reaches the threshold, else 0."""
-        found = source(self.node, name, self._time)
-        if not isinstance(found, tuple):
-            number = floats(found, (1.0,))[0]
+        found = self._inputs.source(self.node, name)
+        if not is_node(found):
+            number = self._inputs.floats(self.node, name, (1.0,))[0]
             return 1.0 if number >= threshold else 0.0
         node, output = found
         if node.GetIdAttr().Get() != "UsdUVTexture":
@@ -129,8 +128,8 @@ class _Inputs:
 
     def normal(self) -> dict[str, Any] | None:
         """The normal map, as the key that scattering closures take."""
-        found = source(self.node, "normal", self._time)
-        if not isinstance(found, tuple):
+        found = self._inputs.source(self.node, "normal")
+        if not is_node(found):
             return None
         node, output = found
         kind = node.GetIdAttr().Get()
@@ -146,13 +145,13 @@ class _Inputs:
         return {"texture": read.id, "uv": read.coordinates.primvar}
 
     def _value(self, name: str, default: float, plain: str) -> Value:
-        found = source(self.node, name, self._time)
+        found = self._inputs.source(self.node, name)
         if found is None:
             return default
-        if not isinstance(found, tuple):
+        if not is_node(found):
             if plain == "r":
-                return floats(found, (default,))[0]
-            numbers = floats(found, (default,) * 3)
+                return self._inputs.checked(self.node, name, found, (default,))[0]
+            numbers = self._inputs.checked(self.node, name, found, (default,) * 3)
             return numbers[0] if numbers[0] == numbers[1] == numbers[2] else numbers
         node, output = found
         kind = node.GetIdAttr().Get()
@@ -180,11 +179,9 @@ class _Inputs:
         return {"texture": read.id, "channel": channel}
 
 
-def read_surface(
-    material: UsdShade.Material, textures: Textures, time: Usd.TimeCode, report: Report
-) -> Surface | None:
+def read_surface(material: UsdShade.Material, textures: Textures, inputs: Inputs) -> Surface | None:
     """A material's surface, or None, with an entry in the report, if it has none we can draw."""
-    prim = material.GetPrim()
+    prim, report = material.GetPrim(), inputs.report
     node = material.ComputeSurfaceSource()[0]
     kind = node.GetIdAttr().Get() if node else None
     if kind not in PREVIEW_SURFACES:
@@ -199,11 +196,11 @@ def read_surface(
         (material.GetVolumeOutput(), "a volume"),
     ):
         if output and output.HasConnectedSource():
-            if what == "displacement" and source(node, what, time) in (None, 0.0):
+            if what == "displacement" and inputs.source(node, what) in (None, 0.0):
                 continue
             report.unsupported(prim, what, "it is ignored")
     check_color_space(node.GetPrim(), report)
-    return _surface(_Inputs(node, textures, time, report), report)
+    return _surface(_Node(node, textures, inputs), report)
 
 
 def _other_context(material: UsdShade.Material) -> tuple[UsdShade.Shader | None, str]:
@@ -220,10 +217,10 @@ def _other_context(material: UsdShade.Material) -> tuple[UsdShade.Shader | None,
     return None, ", ".join(kinds)
 
 
-def _surface(inputs: _Inputs, report: Report) -> Surface:
+def _surface(inputs: _Node, report: Report) -> Surface:
     opaque = _opaque_closure(inputs)
     emission = inputs.color("emissiveColor", 0.0)
-    threshold = floats(inputs.constant("opacityThreshold", 0.0), (0.0,))[0]
+    threshold = inputs.threshold()
     mode = str(inputs.constant("opacityMode", "transparent"))
     presence: Value = 1
     closure = opaque
@@ -259,7 +256,7 @@ def _surface(inputs: _Inputs, report: Report) -> Surface:
     )
 
 
-def _opaque_closure(inputs: _Inputs) -> Closure:
+def _opaque_closure(inputs: _Node) -> Closure:
     """The simplest closure that says what the node says at opacity 1."""
     base = inputs.color("diffuseColor", GREY)
     roughness = inputs.number("roughness", 0.5)
@@ -297,7 +294,7 @@ def _opaque_closure(inputs: _Inputs) -> Closure:
     return closure
 
 
-def _clear_closure(inputs: _Inputs) -> Closure:
+def _clear_closure(inputs: _Node) -> Closure:
     """What is behind the diffuse part where opacity is 0: a clear dielectric of the node's ior.
 
     UsdPreviewSurface's opacity takes away the diffuse part only, so what is left is untinted.
@@ -318,13 +315,10 @@ def _clear_closure(inputs: _Inputs) -> Closure:
 class Materials:
     """Adds each material once for each use of it."""
 
-    def __init__(
-        self, scene: Scene, textures: Textures, time: Usd.TimeCode, report: Report
-    ) -> None:
+    def __init__(self, scene: Scene, textures: Textures, inputs: Inputs) -> None:
         self._scene = scene
         self._textures = textures
-        self._time = time
-        self._report = report
+        self._inputs = inputs
         self._surfaces: dict[Sdf.Path, Surface | None] = {}
         self._display: dict[str, int] = {}
         self._ids: dict[str, int] = {}
@@ -347,7 +341,7 @@ class Materials:
         """A material's surface, read once."""
         path = material.GetPath()
         if path not in self._surfaces:
-            self._surfaces[path] = read_surface(material, self._textures, self._time, self._report)
+            self._surfaces[path] = read_surface(material, self._textures, self._inputs)
         return self._surfaces[path]
 
     def display(self, color: Value | None, opacity: Value | None) -> Surface:

@@ -71,6 +71,9 @@ def read(
         report.unsupported(prim, f"the primvar '{name}' holds no numbers", "it is ignored")
         return None
     data = data.astype(np.float32, copy=False)
+    if not np.isfinite(data).all():
+        report.warning(prim, f"the primvar '{name}' is not finite", "it is ignored")
+        return None
     width = primvar.GetElementSize()
     if not primvar.GetTypeName().isArray:
         data = data[None]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ._pxr import Usd
-from .mesh import MeshData
+from .mesh_data import MeshData
 
 #: Segments around an axis, and from pole to pole.
 AROUND = 128

@@ -14,6 +14,7 @@ from ..scene import Scene
 from ._pxr import Tf, Usd, UsdGeom
 from .camera import Frame, exposure_scale, find_camera, framing_camera, read_camera, read_settings
 from .geometry import Geometry, geometry_light_targets
+from .inputs import Inputs
 from .light import Lights, add_default_lights, stage_is_z_up
 from .material import Materials
 from .report import Report
@@ -141,8 +142,9 @@ def _fill(
     camera: np.ndarray,
 ) -> dict[str, int]:
     """Adds the stage's lights and geometry; returns how many of what."""
-    textures = Textures(scene, time, report)
-    materials = Materials(scene, textures, time, report)
+    inputs = Inputs(time, report)
+    textures = Textures(scene, inputs)
+    materials = Materials(scene, textures, inputs)
     lights = Lights(scene, textures, time, report, gain, z_up)
     geometry = Geometry(scene, materials, lights, time, report, gain)
     items = Walker(stage, time, purposes, report).items()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ._pxr import Usd, UsdGeom
-from .mesh import MeshData, numbers, smooth_normals
+from .mesh_data import MeshData, numbers, smooth_normals
 from .primvar import Elements, Values
 from .report import Report
 from .subdivision import INFINITE, Cage, Refinement, corner_normals

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .mesh_data import sum_rows
+
 #: Sharpness from which UsdGeomMesh takes an edge or a vertex as infinitely sharp.
 INFINITE = 10.0
 
@@ -88,24 +90,18 @@ class Level:
                 (faces == 1) & on_boundary, np.inf, self.vertex_sharpness
             )
 
-    def sum_at(self, index: np.ndarray, values: np.ndarray, size: int) -> np.ndarray:
-        """Sums rows of values that share an index."""
-        return np.stack(
-            [np.bincount(index, values[:, k], size) for k in range(values.shape[1])], axis=1
-        )
-
     def _face_points(self, values: np.ndarray) -> np.ndarray:
-        sums = self.sum_at(self.face_of_corner, values[self.cage.corners], len(self.cage.counts))
+        sums = sum_rows(self.face_of_corner, values[self.cage.corners], len(self.cage.counts))
         return sums / np.maximum(self.cage.counts, 1)[:, None]
 
     def _edge_points(self, values: np.ndarray, faces: np.ndarray) -> np.ndarray:
         ends = values[self.edges[:, 0]] + values[self.edges[:, 1]]
         if self.loop:
             opposite = values[self.cage.corners[self.previous]]
-            across = self.sum_at(self.edge_of_corner, opposite, len(self.edges))
+            across = sum_rows(self.edge_of_corner, opposite, len(self.edges))
             smooth = 0.375 * ends + 0.125 * across
         else:
-            across = self.sum_at(self.edge_of_corner, faces[self.face_of_corner], len(self.edges))
+            across = sum_rows(self.edge_of_corner, faces[self.face_of_corner], len(self.edges))
             smooth = 0.25 * (ends + across)
         blend = np.clip(self.sharpness, 0, 1)[:, None]
         return (1 - blend) * smooth + blend * 0.5 * ends
@@ -116,7 +112,7 @@ class Level:
         ends = np.concatenate([values[b], values[a]])
         if weights is not None:
             ends = ends * np.concatenate([weights, weights])[:, None]
-        return self.sum_at(np.concatenate([a, b]), ends, self.cage.points)
+        return sum_rows(np.concatenate([a, b]), ends, self.cage.points)
 
     def _blended(self, values: np.ndarray, smooth: np.ndarray, crease: np.ndarray) -> np.ndarray:
         """Each vertex's rule by its sharp edges: smooth or dart, crease, corner; blended."""
@@ -136,7 +132,7 @@ class Level:
             beta = _loop_beta(n)
             smooth = (1 - n * beta) * values + beta * around
         else:
-            face_sum = self.sum_at(self.cage.corners, faces[self.face_of_corner], self.cage.points)
+            face_sum = sum_rows(self.cage.corners, faces[self.face_of_corner], self.cage.points)
             smooth = (n - 2) / n * values + (around + face_sum) / n**2
         along = self._neighbors(values, (self.sharpness > 0).astype(float))
         return self._blended(values, smooth, 0.75 * values + 0.125 * along)
@@ -161,7 +157,7 @@ class Level:
             inner = forward.reshape(-1, 3, values.shape[1])
             triangles = outer.reshape(-1, 3, 3, values.shape[1])
             return np.concatenate([triangles, inner[:, None]], axis=1).reshape(-1, values.shape[1])
-        faces = self.sum_at(self.face_of_corner, values, len(self.cage.counts))
+        faces = sum_rows(self.face_of_corner, values, len(self.cage.counts))
         faces = (faces / np.maximum(self.cage.counts, 1)[:, None])[self.face_of_corner]
         return np.stack([values, forward, faces, backward], axis=1).reshape(-1, values.shape[1])
 
@@ -213,7 +209,7 @@ class Level:
             smooth = (weight * values + around) / (weight + n)
         else:
             opposite = values[self.cage.corners[self.following[self.following]]]
-            diagonal = self.sum_at(self.cage.corners, opposite, self.cage.points)
+            diagonal = sum_rows(self.cage.corners, opposite, self.cage.points)
             smooth = (n**2 * values + 4 * around + diagonal) / (n * (n + 5))
         along = self._neighbors(values, (self.sharpness > 0).astype(float))
         return self._blended(values, smooth, (4 * values + along) / 6)
@@ -290,6 +286,6 @@ def corner_normals(level: Level, points: np.ndarray) -> np.ndarray | None:
     edges_out = points[corners[following]] - points[corners]
     edges_in = points[corners[previous]] - points[corners]
     weighted = np.cross(edges_out, edges_in)
-    sums = level.sum_at(group, weighted, len(corners))[group]
+    sums = sum_rows(group, weighted, len(corners))[group]
     lengths = np.linalg.norm(sums, axis=1, keepdims=True)
     return np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)

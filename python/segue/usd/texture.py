@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 from .. import images
 from ..scene import Scene
 from ._pxr import Ar, Sdf, Usd, UsdShade
-from .report import Report
+from .inputs import Inputs, is_node
 
 #: UsdPrimvarReader_<type> whose result is a number or a colour.
 COLOR_READERS = tuple(
@@ -35,46 +34,6 @@ class Rgba(NamedTuple):
 
 #: Where nothing is authored.
 MISSING = Rgba(0.5, 0.5, 0.5, 1.0)
-
-Source = tuple[UsdShade.Shader, str]
-
-
-def source(shader: UsdShade.ConnectableAPI, name: str, time: Usd.TimeCode) -> Source | Any:
-    """What feeds an input: (shader, output name) if it is connected to one, else a value or None.
-
-    Connections through node graphs and materials' interfaces are followed.
-    """
-    shade_input = shader.GetInput(name)
-    if not shade_input:
-        return None
-    for attribute in shade_input.GetValueProducingAttributes():
-        if UsdShade.Output.IsOutput(attribute):
-            node = UsdShade.Shader(attribute.GetPrim())
-            if node:
-                return node, UsdShade.Output(attribute).GetBaseName()
-        else:
-            return attribute.Get(time)
-    return None
-
-
-def value(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: Any) -> Any:
-    """An input that cannot be connected to a texture: its value, or the default."""
-    found = source(shader, name, time)
-    return default if found is None or isinstance(found, tuple) else found
-
-
-def floats(found: Any, default: Sequence[float]) -> list[float]:
-    """A value as as many numbers as the default has, whatever type it was authored with.
-
-    One number counts for all (but not for the alpha of four), missing ones come from the default.
-    """
-    try:
-        given = [float(v) for v in np.atleast_1d(np.asarray(found, dtype=np.float64)).ravel()]
-    except (TypeError, ValueError):
-        return list(default)
-    if len(given) == 1:
-        given *= min(len(default), 3)
-    return (given + list(default)[len(given) :])[: len(default)]
 
 
 @dataclass(frozen=True)
@@ -119,10 +78,11 @@ class _Loaded:
 class Textures:
     """Loads each picture once for each way it is decoded, and makes a texture for each node."""
 
-    def __init__(self, scene: Scene, time: Usd.TimeCode, report: Report) -> None:
+    def __init__(self, scene: Scene, inputs: Inputs) -> None:
         self._scene = scene
-        self._time = time
-        self._report = report
+        self._inputs = inputs
+        self._time = inputs.time
+        self._report = inputs.report
         self._images: dict[tuple, _Loaded | str] = {}
         self._textures: dict[tuple, ImageTexture | Rgba] = {}
 
@@ -152,7 +112,7 @@ class Textures:
         name = self._primvar_name(shader)
         if not name:
             return None
-        numbers = floats(value(shader, "fallback", self._time, 0.0), (0.0, 0.0, 0.0, 1.0))
+        numbers = self._inputs.floats(shader, "fallback", (0.0, 0.0, 0.0, 1.0))
         texture = self._scene.add_texture(
             str(shader.GetPath()), {"type": "attribute", "name": name, "default": numbers}
         )
@@ -172,21 +132,22 @@ class Textures:
     def _uv_texture(
         self, shader: UsdShade.Shader, normal_map: bool, threshold: float | None, channel: str
     ) -> ImageTexture | Rgba:
-        prim, time = shader.GetPrim(), self._time
-        scale = floats(value(shader, "scale", time, 1), (1.0, 1.0, 1.0, 1.0))
-        bias = floats(value(shader, "bias", time, 0), (0.0, 0.0, 0.0, 0.0))
-        file_attribute = self._producer(shader, "file")
-        asset = file_attribute.Get(time) if file_attribute else None
-        space = str(value(shader, "sourceColorSpace", time, "auto"))
+        prim, inputs = shader.GetPrim(), self._inputs
+        scale = inputs.floats(shader, "scale", (1.0, 1.0, 1.0, 1.0))
+        bias = inputs.floats(shader, "bias", (0.0, 0.0, 0.0, 0.0))
+        file_attribute = inputs.attribute(shader, "file")
+        asset = file_attribute.Get(self._time) if file_attribute else None
+        space = str(inputs.value(shader, "sourceColorSpace", "auto"))
         mask = None if threshold is None else (channel, scale, bias, threshold)
         loaded: _Loaded | str = "a UsdUVTexture without a file"
-        if asset and asset.path:
+        if isinstance(asset, Sdf.AssetPath) and asset.path:
             loaded = self._load(file_attribute, asset, space, mask)
         if isinstance(loaded, str):
-            fallback = value(shader, "fallback", time, None)
-            word = "its fallback value is used" if fallback is not None else "grey 0.5 is used"
-            self._report.warning(prim, loaded, word)
-            return MISSING if fallback is None else Rgba(*floats(fallback, (0, 0, 0, 1)))
+            if inputs.source(shader, "fallback") is None:
+                self._report.warning(prim, loaded, "grey 0.5 is used")
+                return MISSING
+            self._report.warning(prim, loaded, "its fallback value is used")
+            return Rgba(*inputs.floats(shader, "fallback", (0.0, 0.0, 0.0, 1.0)))
         if mask is not None:
             scale, bias = [1.0] * 4, [0.0] * 4
         elif normal_map and loaded.is_8_bit and scale[:3] == [1, 1, 1] and bias[:3] == [0, 0, 0]:
@@ -213,14 +174,8 @@ class Textures:
         number = self._scene.add_texture(str(prim.GetPath()), texture)
         return ImageTexture(number, coordinates, loaded.has_alpha or scale[3] + bias[3] != 1)
 
-    def _producer(self, shader: UsdShade.Shader, name: str) -> Usd.Attribute | None:
-        """The attribute that holds an input's value: its own, or a material's interface input."""
-        shade_input = shader.GetInput(name)
-        found = shade_input.GetValueProducingAttributes() if shade_input else []
-        return found[0] if found else None
-
     def _wrap(self, shader: UsdShade.Shader, name: str, metadata: str) -> str:
-        mode = str(value(shader, name, self._time, "useMetadata"))
+        mode = str(self._inputs.value(shader, name, "useMetadata"))
         if mode == "useMetadata":
             # UsdUVTexture: the file's own mode, and black where the file has none.
             mode = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror"}.get(
@@ -236,11 +191,13 @@ class Textures:
         matrix = np.eye(3)
         name, node = "st", shader
         while True:
-            found = source(node, name, self._time)
-            if not isinstance(found, tuple):
+            found = self._inputs.source(node, name)
+            if not is_node(found):
                 if found is not None and node.GetInput(name).GetAttr().HasAuthoredValue():
                     # A constant coordinate: every point sees the same texel.
-                    constant = matrix @ np.array([*floats(found, (0.0, 0.0)), 1.0])
+                    constant = matrix @ np.array(
+                        [*self._inputs.checked(node, name, found, (0.0, 0.0)), 1.0]
+                    )
                     matrix = np.zeros((3, 3))
                     matrix[:, 2] = constant
                 else:
@@ -265,14 +222,14 @@ class Textures:
 
     def _transform_2d(self, node: UsdShade.Shader) -> np.ndarray:
         """UsdTransform2d: scaled, then turned counter-clockwise, then moved."""
-        turn = math.radians(floats(value(node, "rotation", self._time, 0), (0.0,))[0])
-        sx, sy = floats(value(node, "scale", self._time, 1), (1.0, 1.0))
-        tx, ty = floats(value(node, "translation", self._time, 0), (0.0, 0.0))
+        turn = math.radians(self._inputs.floats(node, "rotation", (0.0,))[0])
+        sx, sy = self._inputs.floats(node, "scale", (1.0, 1.0))
+        tx, ty = self._inputs.floats(node, "translation", (0.0, 0.0))
         c, s = math.cos(turn), math.sin(turn)
         return np.array([[c * sx, -s * sy, tx], [s * sx, c * sy, ty], [0.0, 0.0, 1.0]])
 
     def _primvar_name(self, node: UsdShade.Shader) -> str:
-        name = value(node, "varname", self._time, "")
+        name = self._inputs.value(node, "varname", "")
         return str(name).removeprefix("primvars:") if name else ""
 
     def _load(
