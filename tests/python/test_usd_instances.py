@@ -304,12 +304,12 @@ def test_values_for_each_instance_are_said():
     assert "displayColor" in what
 
 
-def test_instances_scaled_to_nothing_are_left_out():
+def test_instances_without_volume_are_left_out():
     sizes = "(1, 1, 1), (1, 1, 1), (0, 1, 1), (1, 1, 1), (1, 1, 1)"
     scene, imported = load(INSTANCER % f"float3[] scales = [{sizes}]")
     assert len(by_prim(scene)["/P/Protos/A/M"]) == 2
     assert reported(imported, usd.Kind.LEFT_OUT) == [
-        ("/P/Protos/A/M", "1 instances scaled to nothing")
+        ("/P/Protos/A/M", "1 instances without volume")
     ]
 
 

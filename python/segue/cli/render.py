@@ -190,8 +190,8 @@ def _render_frame(
     if cancellation.requested:
         return None
     render = Render(scene, {**stage.settings(), **_settings(options)})
-    unsupported = [str(e) for e in stage.report.of(usd.Kind.UNSUPPORTED)]
-    del scene, stage.scene
+    report = {kind.name.lower(): [str(e) for e in stage.report.of(kind)] for kind in usd.Kind}
+    del scene, stage.scene  # the render has its own copy
     curve = None
     if reference is not None:
         try:
@@ -210,7 +210,13 @@ def _render_frame(
         render.run(on_progress)
     stats = render.stats()
     stats["loading_seconds"] = loading + float(stats.get("build_seconds", 0.0))
-    stats["unsupported"] = unsupported
+    stats["unsupported"] = report["unsupported"]
+    stats["stage"] = {
+        "path": str(options.stage),
+        "camera": stage.camera,
+        "frame": stage.frame,
+        **{k: v for k, v in report.items() if k != "unsupported"},
+    }
     if curve is not None:
         stats["curve"] = curve.finish(stats)
         stats["seconds"] -= curve.cost

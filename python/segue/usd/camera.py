@@ -14,6 +14,8 @@ from .transform import column_matrix, flat, without_scale
 
 #: UsdGeomCamera's apertures and focal length are in tenths of a scene unit.
 TENTH = 0.1
+#: No lens is longer, or shorter than its inverse; beyond, arithmetic overflows.
+LONGEST = 1e9
 #: Width of a picture for which nothing else is said.
 DEFAULT_WIDTH = 1280
 
@@ -165,6 +167,11 @@ class Frame:
     crop: tuple[int, int, int, int] | None
 
 
+def _is_length(value: float) -> bool:
+    """Whether a lens can have this size."""
+    return 1.0 / LONGEST < value < LONGEST
+
+
 def read_camera(
     prim: Usd.Prim,
     time: Usd.TimeCode,
@@ -185,15 +192,18 @@ def read_camera(
     focal = float(get(camera.GetFocalLengthAttr()))
     width = float(get(camera.GetHorizontalApertureAttr()))
     height = float(get(camera.GetVerticalApertureAttr()))
-    if not (width > 0 and height > 0):
+    if not (_is_length(width) and _is_length(height)):
         report.warning(prim, f"an aperture of {width:g} x {height:g}", "20.955 x 15.2908 is used")
         width, height = 20.955, 15.2908
     orthographic = get(camera.GetProjectionAttr()) == UsdGeom.Tokens.orthographic
-    if not orthographic and not focal > 0:
+    if not orthographic and not _is_length(focal):
         report.warning(prim, f"a focal length of {focal:g}", "50 is used")
         focal = 50.0
     x = float(get(camera.GetHorizontalApertureOffsetAttr()))
     y = float(get(camera.GetVerticalApertureOffsetAttr()))
+    if not abs(x) + abs(y) < LONGEST:
+        report.warning(prim, f"an aperture offset of {x:g}, {y:g}", "0 is used")
+        x = y = 0.0
     scale = TENTH if orthographic else 1.0 / focal
     window = (
         (x - 0.5 * width) * scale,
@@ -213,16 +223,16 @@ def read_camera(
     # The schema's fallback for the far plane only says that nothing was said.
     if clipping.HasAuthoredValue() and math.isfinite(far) and far > near:
         description["far"] = far
-    stop, distance = (
-        float(get(camera.GetFStopAttr())),
-        float(get(camera.GetFocusDistanceAttr())),
-    )
+    stop = float(get(camera.GetFStopAttr()))
+    distance = float(get(camera.GetFocusDistanceAttr()))
     if stop > 0 and not orthographic:
-        if distance > 0:
+        if _is_length(stop) and 0 < distance < math.inf:
             description["aperture_radius"] = 0.5 * focal * TENTH / stop
             description["focus_distance"] = distance
         else:
-            report.warning(prim, "an fStop without a focusDistance", "everything is in focus")
+            report.warning(
+                prim, f"fStop {stop:g} with focusDistance {distance:g}", "everything is in focus"
+            )
     if len(camera.GetClippingPlanesAttr().Get(time) or ()):
         report.unsupported(prim, "clipping planes", "they are ignored")
     return Frame(str(prim.GetPath()), description, size, _crop(size, settings))

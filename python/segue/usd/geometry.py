@@ -17,7 +17,7 @@ from .mesh import add_attributes, read_mesh
 from .mesh_data import MeshData, area
 from .report import Report
 from .shapes import shape_of
-from .transform import is_invertible
+from .transform import is_usable
 from .walk import Item
 
 #: What each kind of prim that is not drawn is called, and what is done instead.
@@ -69,9 +69,9 @@ class Geometry:
         if kind == "SkelRoot":
             self._report.unsupported(prim, "skinning", "the rest shape is drawn")
             return
-        usable = is_invertible(item.transforms)
+        usable = is_usable(item.transforms)
         if not usable.all():
-            self._report.left_out(prim, f"{int((~usable).sum())} instances scaled to nothing")
+            self._report.left_out(prim, f"{int((~usable).sum())} instances without volume")
             item = replace(item, transforms=item.transforms[usable])
             if not len(item.transforms):
                 return
@@ -90,7 +90,7 @@ class Geometry:
             return
         key, make, matrix = shape
         transforms = item.transforms @ matrix
-        if not is_invertible(matrix[None])[0]:
+        if not is_usable(matrix[None])[0]:
             self._report.left_out(prim, "a shape without size")
             return
         data = self._data.get(key)

@@ -16,7 +16,7 @@ from ._pxr import Tf, Usd, UsdGeom, UsdLux
 from .color_space import check_color_space
 from .report import Report
 from .texture import Textures
-from .transform import flat, is_invertible, without_scale
+from .transform import flat, is_usable, without_scale
 
 #: Turns the dome's +Y pole to +Z; longitude 0 then points to -Y (UsdLuxDomeLight_1).
 _POLE_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -131,17 +131,17 @@ class Lights:
         light = UsdLux.LightAPI(prim)
         self.check(prim)
         level = self._gain * radiance(light, self._time)
-        if not np.isfinite(level).all() or (level < 0).any():
+        if not np.isfinite(level.astype(np.float32)).all() or (level < 0).any():
             self._report.warning(prim, "a radiance that is negative or not finite", "left out")
             return
         if not level.any():
             self._report.left_out(prim, "a light of intensity or colour 0")
             return
         shape = self._shape_keys(prim)
-        usable = is_invertible(transforms) if kind not in ("DomeLight", "DomeLight_1") else None
+        usable = is_usable(transforms) if kind not in ("DomeLight", "DomeLight_1") else None
         for number, matrix in enumerate(transforms):
             if usable is not None and not usable[number]:
-                self._report.left_out(prim, "a light scaled to nothing")
+                self._report.left_out(prim, "a light without volume")
                 continue
             description = make(prim, light, level, matrix)
             if description is None:

@@ -126,7 +126,8 @@ def load(
     target.set_camera(shot.name, shot.camera)
 
     camera_to_world = np.reshape(shot.camera["transform"], (4, 4))
-    counts = _fill(target, stage, time, purposes, report, gain, z_up, camera_to_world)
+    with np.errstate(all="ignore"):  # what is not finite is looked for where it matters
+        counts = _fill(target, stage, time, purposes, report, gain, z_up, camera_to_world)
     value = None if time.IsDefault() or time.IsEarliestTime() else time.GetValue()
     return Imported(target, shot.name, shot.resolution, shot.crop, value, report, counts)
 

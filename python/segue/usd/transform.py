@@ -32,19 +32,20 @@ def without_scale(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     linear = matrix[:3, :3]
     lengths = np.linalg.norm(linear, axis=0)
-    if not np.all(np.isfinite(linear)) or np.any(lengths == 0):
+    if not np.all(np.isfinite(matrix)) or np.any(lengths == 0):
         return np.eye(4), lengths
     u, _, vt = np.linalg.svd(linear)
-    rigid = matrix.copy()
+    rigid = np.eye(4)
     rigid[:3, :3] = u @ vt
+    rigid[:3, 3] = matrix[:3, 3]
     return rigid, lengths
 
 
-def is_invertible(matrices: np.ndarray) -> np.ndarray:
-    """Which of (n, 4, 4) matrices have a finite, nonzero determinant."""
-    finite = np.isfinite(matrices).all(axis=(1, 2))
-    result = np.zeros(len(matrices), bool)
-    result[finite] = np.linalg.det(matrices[finite, :3, :3]) != 0
+def is_usable(matrices: np.ndarray) -> np.ndarray:
+    """Which of (n, 4, 4) matrices are affine with a finite, nonzero determinant."""
+    result = np.isfinite(matrices).all(axis=(1, 2))
+    result &= (matrices[:, 3] == [0, 0, 0, 1]).all(axis=1)
+    result[result] = np.linalg.det(matrices[result, :3, :3]) != 0
     return result
 
 
