@@ -158,6 +158,25 @@ fn directions_towards_shapes() {
 }
 
 #[test]
+fn directions_towards_rects_chosen_by_area() {
+    // a parallelogram, and a rectangle too small for its solid angle to matter
+    let sheared = glam::DAffine3::from_mat3_translation(
+        glam::DMat3::from_cols(
+            glam::DVec3::new(1.0, 0.2, 0.1),
+            glam::DVec3::new(-0.6, 0.8, 0.0),
+            glam::DVec3::Z,
+        ),
+        glam::DVec3::new(0.2, 0.1, 1.0),
+    );
+    let small = transform([0.0, 0.0, 1.0], [0.1, 0.2, -1.0], [2e-3, 1e-3, 1.0]);
+    for m in [rows(&sheared), small] {
+        let json = format!(r#"{{"type":"rect","radiance":[1,1,1],"transform":{m}}}"#);
+        let r = receiver([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]);
+        directions_towards(&format!("rect under {m}"), &emitters_of(&[&json], &[], &[]), r);
+    }
+}
+
+#[test]
 fn directions_towards_triangles() {
     for (scale, height) in [(1.0, 0.3), (0.1, 1.0)] {
         let vertices = [Vec3::ZERO, Vec3::X * scale, Vec3::new(0.3, -1.0, 0.5) * scale];
