@@ -156,7 +156,8 @@ typedef struct segue_callbacks {
  * changed afterwards without effect on the render. */
 SEGUE_API segue_status segue_render_create(const segue_scene *scene, const char *settings_json, segue_render **out);
 SEGUE_API void segue_render_free(segue_render *render); /* null is allowed; must not be running */
-/* Renders until the settings say stop. Blocks. May be called again to continue. */
+/* Renders until the settings say stop. Blocks. Called again after a cancel or a time limit it goes on
+ * from there: the limit of samples counts from the beginning, the time limit from the call. */
 SEGUE_API segue_status segue_render_run(segue_render *render, const segue_callbacks *callbacks);
 SEGUE_API segue_status segue_render_cancel(segue_render *render);
 

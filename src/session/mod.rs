@@ -238,15 +238,13 @@ impl Session {
             }
             if !self.stop.is_raised() {
                 self.pool.install(|| integrator.iterate(&context, iteration));
+                // one that was cut short counts too: its samples must not be drawn again
+                locked(&self.state).iterations = iteration.saturating_add(1);
             }
             if self.stop.is_raised() {
                 self.note(watch, before, cpu_before, true);
                 return StopReason::Time;
             }
-            let mut state = locked(&self.state);
-            // a number beyond 2^32 iterations would only repeat samples
-            state.iterations = state.iterations.saturating_add(1);
-            drop(state);
             let error = self.note(watch, before, cpu_before, false);
             if let (Some(limit), Some(error)) = (limits.error, error)
                 && error <= limit
