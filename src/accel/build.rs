@@ -40,8 +40,7 @@ pub(super) fn build(meshes: &[MeshGeometry], instances: &[InstanceGeometry]) -> 
         world_triangles.extend(triangles(&meshes[placed.mesh], placed.id, Some(placed.to_world), &rejects));
     }
     limit("triangles", world_triangles.len())?;
-    let baked = triangle_tree(&world_triangles);
-    drop(world_triangles);
+    let baked = triangle_tree(world_triangles);
 
     let (trees, tree_of_mesh) = shared_trees(meshes, &shared, &rejects);
     let parts: Vec<Vec<Bounds>> = trees.iter().map(child_bounds).collect();
@@ -119,7 +118,7 @@ fn shared_trees(
         .par_iter()
         .zip(&is_used)
         .map(|(mesh, &is_used)| {
-            is_used.then(|| triangle_tree(&triangles(mesh, u32::MAX, None, rejects))).flatten()
+            is_used.then(|| triangle_tree(triangles(mesh, u32::MAX, None, rejects))).flatten()
         })
         .collect();
     let mut trees = Vec::new();

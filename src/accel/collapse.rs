@@ -8,10 +8,12 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
 use super::geometry::{Bounds, Triangle};
-use super::kernel::{LANES, LEAF, Node, Tree, TriangleBlock, WIDTH};
+use super::kernel::{LANES, LEAF, Node, Tree, TriangleBlock, WIDTH, compact};
+use super::twins::take_twins;
 
 /// Tree over triangles, in blocks of up to four. None without triangles.
-pub(super) fn triangle_tree(triangles: &[Triangle]) -> Option<Tree> {
+pub(super) fn triangle_tree(mut triangles: Vec<Triangle>) -> Option<Tree> {
+    let twins = take_twins(&mut triangles);
     let boxes: Vec<_> = triangles.par_iter().map(Triangle::bounds).collect();
     let mut blocks = Vec::with_capacity(triangles.len() / 3);
     let mut tree = wide_tree(&boxes, LANES as u32, |members| {
@@ -29,8 +31,8 @@ pub(super) fn triangle_tree(triangles: &[Triangle]) -> Option<Tree> {
         blocks.push(block);
         blocks.len() as u32 - 1
     })?;
-    blocks.shrink_to_fit();
-    tree.blocks = blocks;
+    tree.blocks = compact(blocks);
+    tree.twins = twins;
     Some(tree)
 }
 
@@ -126,8 +128,7 @@ fn wide_tree(boxes: &[Bounds], leaf_size: u32, mut leaf: impl FnMut(&[u32]) -> u
             };
         }
     }
-    nodes.shrink_to_fit();
-    Some(Tree { nodes, blocks: Vec::new() })
+    Some(Tree { nodes: compact(nodes), blocks: Vec::new(), twins: Vec::new() })
 }
 
 /// The binary subtrees that become the children of the wide node for `root`: opens the largest until there are eight.
@@ -150,6 +151,9 @@ fn choose_children(binary: &Bvh2, sizes: &[u32], root: u32, leaf_size: u32) -> (
         children[count] = first + 1;
         count += 1;
     }
+    children[..count].sort_by(|&b, &a| {
+        binary.nodes[a as usize].aabb().half_area().total_cmp(&binary.nodes[b as usize].aabb().half_area())
+    });
     (children, count)
 }
 

@@ -33,6 +33,10 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    fn size(&self) -> DVec3 {
+        (self.max - self.min).as_dvec3()
+    }
+
     /// Grown on all sides by `by`, and rounded outwards.
     pub fn padded(self, by: Vec3) -> Self {
         Self { min: (self.min - by).map(f32::next_down), max: (self.max + by).map(f32::next_up) }
@@ -48,6 +52,11 @@ pub(super) struct Triangle {
 }
 
 impl Triangle {
+    /// Instance and index, in the order in which ties are decided.
+    pub fn id(&self) -> (u32, u32) {
+        (self.instance, self.index)
+    }
+
     /// The box that holds whatever the triangle test takes for a hit.
     pub fn bounds(&self) -> Bounds {
         let bounds = Bounds::of(self.positions);
@@ -135,18 +144,62 @@ pub(super) fn is_invertible(to_world: &DAffine3) -> bool {
     volume >= LEAST_VOLUME && all_fit(&to_world.matrix3) && fits(to_world.translation) && all_fit(&inverse)
 }
 
-/// Whether rounding the baked vertices to `f32` leaves the shape of a mesh as it is: the spacing of `f32` at its place
-/// must be small against its triangles.
+/// How much larger the triangles' boxes may become, against the whole mesh, before it is better left unbaked. Turning
+/// alone makes flat boxes up to four times as large, which is still cheaper than a second level.
+const LARGEST_GROWTH: f64 = 6.0;
+
+/// Whether a mesh is traced as precisely and as fast in world space as in its own.
 pub(super) fn bakes_well(to_world: &DAffine3, mesh: &MeshGeometry) -> bool {
     if *to_world == DAffine3::IDENTITY {
         return true;
     }
     let finite = mesh.positions.iter().copied().filter(|p| p.is_finite());
     let bounds = Bounds::of(finite.map(|p| bake_point(to_world, p)));
+    // The spacing of `f32` at the mesh's place must be small against its triangles.
     let size = (bounds.max - bounds.min).max_element() / (mesh.triangles.len() as f32).sqrt();
     let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
     // False if there is no finite vertex.
-    farthest * f32::EPSILON < 1e-3 * size
+    let is_precise = farthest * f32::EPSILON < 1e-3 * size;
+    is_precise && box_growth(to_world, mesh) <= LARGEST_GROWTH
+}
+
+/// By how much a transform makes the triangles' boxes larger, in relation to the mesh's own box as it is transformed:
+/// slanted slivers fill their boxes badly, and rays that pass the mesh must look into every box. Zero if there is
+/// nothing to compare.
+fn box_growth(to_world: &DAffine3, mesh: &MeshGeometry) -> f64 {
+    const CHUNK: usize = 4096;
+    // The mesh's box, and the summed areas of the triangles' boxes before and after; chunks are summed in a fixed order,
+    // whatever the number of threads.
+    let chunk_sums = |triangles: &[[u32; 3]]| {
+        let (mut all, mut areas) = (Bounds::EMPTY, [0.0; 2]);
+        for corners in triangles {
+            let before = corners.map(|c| mesh.positions[c as usize]);
+            let after = before.map(|p| bake_point(to_world, p));
+            if before.iter().chain(&after).all(|p| p.is_finite()) {
+                let bounds = Bounds::of(before);
+                all = all.union(bounds);
+                areas[0] += half_area(DMat3::from_diagonal(bounds.size()));
+                areas[1] += half_area(DMat3::from_diagonal(Bounds::of(after).size()));
+            }
+        }
+        (all, areas)
+    };
+    let chunks: Vec<_> = mesh.triangles.par_chunks(CHUNK).map(chunk_sums).collect();
+    let (all, [before, after]) =
+        chunks.into_iter().fold((Bounds::EMPTY, [0.0; 2]), |(all, [b, a]), chunk| {
+            (all.union(chunk.0), [b + chunk.1[0], a + chunk.1[1]])
+        });
+    if before == 0.0 {
+        return 0.0;
+    }
+    let sides = DMat3::from_diagonal(all.size());
+    (after / half_area(to_world.matrix3 * sides)) / (before / half_area(sides))
+}
+
+/// Half the surface of the parallelepiped that the columns span.
+fn half_area(sides: DMat3) -> f64 {
+    let [a, b, c] = [sides.col(0), sides.col(1), sides.col(2)];
+    a.cross(b).length() + b.cross(c).length() + c.cross(a).length()
 }
 
 /// `|M| |M^-1|`: how rounding errors made in mesh space look in world space, for errors relative to world positions.

@@ -18,6 +18,7 @@ mod geometry;
 mod kernel;
 pub mod offset;
 mod ray;
+mod twins;
 mod walk;
 
 use glam::{Affine3A, Vec3};

@@ -6,7 +6,7 @@
 //! only hits that are certain to lie in front of the origin. So the offset is about one spacing of `f32`, whatever the
 //! size of the triangle.
 
-use glam::{Affine3A, DVec3, Vec3};
+use glam::{Affine3A, DMat3, Mat3, Vec3};
 
 use super::geometry::{amplification, bake_point, geometric_normal, widen};
 use super::ray::ROUNDING;
@@ -26,8 +26,9 @@ pub struct SurfacePoint {
     /// Unit geometric normal: by the right hand in mesh space, taken to world space as normals are. So the outside of a
     /// mesh stays its outside when it is mirrored.
     pub normal: Vec3,
-    /// How much of the rounding of a far ray's end reaches this triangle's mesh space; zero for baked triangles.
-    amplification: f32,
+    /// What the roundings of a ray on its way into the triangle's mesh space come to in world space, by axis; zero for
+    /// baked triangles, whose rays go nowhere.
+    amplification: Mat3,
 }
 
 impl SurfacePoint {
@@ -50,9 +51,8 @@ impl SurfacePoint {
         let way = target.position - self.position;
         // The rounding of the direction moves the end by half a spacing of its length on each axis, and the transform
         // into the target's mesh space by a few more.
-        let length = way.abs().max_element();
-        let rounding = 4.0 * ROUNDING * way.abs()
-            + Vec3::splat(2.0 * TRANSFORM_ROUNDINGS as f32 * ROUNDING * target.amplification * length);
+        let roundings = 2.0 * TRANSFORM_ROUNDINGS as f32 * ROUNDING;
+        let rounding = 4.0 * ROUNDING * way.abs() + roundings * (target.amplification * way.abs());
         let origin = spawn_origin(self.position, self.error, self.normal, way);
         let end = spawn_origin(target.position, target.error + rounding, target.normal, -way);
         Ray { t_max: 1.0, ..Ray::new(origin, end - origin) }
@@ -102,19 +102,21 @@ impl Accel {
         let position = exact.as_vec3();
         // One rounding, and a little for those in double precision.
         let mut error = (position.as_dvec3() - exact).abs() + (a.abs() + b.abs() + c.abs()) * 1e-15;
-        let mut factor = 0.0;
+        let mut amplified = DMat3::ZERO;
         if !is_baked {
-            let amplification = amplification(&to_world.matrix3);
+            amplified = amplification(&to_world.matrix3);
             let reach = (exact - to_world.translation).abs();
-            error += amplification * reach * (TRANSFORM_ROUNDINGS * f64::from(ROUNDING));
-            factor = (amplification * DVec3::ONE).max_element();
+            error += amplified * reach * (TRANSFORM_ROUNDINGS * f64::from(ROUNDING));
         }
         let flip = if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
         SurfacePoint {
             position,
             error: error.as_vec3().map(f32::next_up),
             normal: (geometric_normal(corners) * flip).normalize().as_vec3(),
-            amplification: factor as f32,
+            amplification: amplified.as_mat3(),
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

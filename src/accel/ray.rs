@@ -1,9 +1,9 @@
 //! What traversal precomputes about a ray, and the parts of the triangle test that run in double precision.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::Ray;
-use super::kernel::TriangleBlock;
+use super::kernel::{LANES, TriangleBlock};
 
 /// Half the spacing of `f32` just above one: the relative error of one rounding.
 pub(super) const ROUNDING: f32 = f32::EPSILON / 2.0;
@@ -22,6 +22,7 @@ pub(super) fn box_padding(extent: f32) -> f32 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepared {
     pub origin: [f32; 3],
+    pub direction: [f32; 3],
     /// Reciprocal direction, shrunk towards zero: for the planes where the ray enters.
     pub inv_near: [f32; 3],
     /// Reciprocal direction, grown: for the planes where the ray leaves.
@@ -72,6 +73,7 @@ impl Prepared {
         let slack = SLAB_ROUNDINGS * ROUNDING;
         Some(Self {
             origin: origin.to_array(),
+            direction: d,
             inv_near: (inverse * (1.0 - slack)).to_array(),
             inv_far: (inverse * (1.0 + slack)).to_array(),
             negative: d.map(|d| d.is_sign_negative() as usize),
@@ -87,64 +89,67 @@ struct Sheared {
     x: [f32; 3],
     y: [f32; 3],
     z: [f32; 3],
-    /// Largest error of `x` and `y`.
-    error: [f64; 2],
 }
 
 impl Sheared {
+    #[inline(always)]
     fn new(ray: &Prepared, block: &TriangleBlock, lane: usize) -> Self {
         let [kx, ky, kz] = ray.axes;
         let [sx, sy, sz] = ray.shear;
-        let relative = |axis: usize| block.vertices.map(|vertex| vertex[axis][lane] - ray.origin[axis]);
-        let (px, py, pz) = (relative(kx), relative(ky), relative(kz));
-        let largest = |p: [f32; 3]| p.iter().fold(0.0, |m: f32, p| m.max(p.abs())) as f64;
-        let error = |p: [f32; 3], s: f32| 5.0 * ROUNDING as f64 * (largest(p) + s.abs() as f64 * largest(pz));
-        Self {
-            x: [0, 1, 2].map(|i| px[i] - sx * pz[i]),
-            y: [0, 1, 2].map(|i| py[i] - sy * pz[i]),
-            z: pz.map(|z| sz * z),
-            error: [error(px, sx), error(py, sy)],
+        let mut sheared = Self { x: [0.0; 3], y: [0.0; 3], z: [0.0; 3] };
+        for (i, vertex) in block.vertices.iter().enumerate() {
+            let x = vertex[kx][lane] - ray.origin[kx];
+            let y = vertex[ky][lane] - ray.origin[ky];
+            let z = vertex[kz][lane] - ray.origin[kz];
+            (sheared.x[i], sheared.y[i], sheared.z[i]) = (x - sx * z, y - sy * z, sz * z);
         }
+        sheared
     }
 
     /// Signed doubled areas opposite each vertex. Products of two `f32` are exact in `f64`, so the signs are right.
-    fn edges(&self) -> [f64; 3] {
-        let [x, y] = [self.x, self.y].map(|c| c.map(f64::from));
-        [x[1] * y[2] - y[1] * x[2], x[2] * y[0] - y[2] * x[0], x[0] * y[1] - y[0] * x[1]]
+    #[inline(always)]
+    fn areas(&self) -> [f64; 3] {
+        let area = |a: usize, b: usize| {
+            f64::from(self.x[a]) * f64::from(self.y[b]) - f64::from(self.y[a]) * f64::from(self.x[b])
+        };
+        [area(1, 2), area(2, 0), area(0, 1)]
     }
 }
 
 /// The triangle test of one lane in double precision, for when a single-precision area came out as zero: then its sign
 /// is not known and the hit lies on an edge, or close. Returns `(t, u, v)` without a look at the ray's limits.
-#[cold]
+#[inline(never)]
 pub(super) fn exact_test(ray: &Prepared, block: &TriangleBlock, lane: usize) -> Option<[f32; 3]> {
     let sheared = Sheared::new(ray, block, lane);
-    let e = sheared.edges();
-    let inside = e.iter().all(|&e| e >= 0.0) || e.iter().all(|&e| e <= 0.0);
-    let det = e[0] + e[1] + e[2];
+    let [a, b, c] = sheared.areas();
+    let inside = (a >= 0.0 && b >= 0.0 && c >= 0.0) || (a <= 0.0 && b <= 0.0 && c <= 0.0);
+    let det = a + b + c;
     if !inside || det == 0.0 {
         return None;
     }
-    let b = e.map(|e| e / det);
-    let z = sheared.z.map(f64::from);
-    let t = z[0] + b[1] * (z[1] - z[0]) + b[2] * (z[2] - z[0]);
-    Some([t as f32, b[1] as f32, b[2] as f32])
+    let (u, v) = (b / det, c / det);
+    let [z, zb, zc] = sheared.z.map(f64::from);
+    let t = z + u * (zb - z) + v * (zc - z);
+    Some([t as f32, u as f32, v as f32])
 }
 
-/// Upper bound of the error of the `t` that the triangle test computes for one lane, in the manner of Pharr, Jakob and
-/// Humphreys, "Physically Based Rendering" (4th edition), section 6.8.7.
-#[cold]
-pub(super) fn t_error(ray: &Prepared, block: &TriangleBlock, lane: usize) -> f32 {
-    let gamma = |n: f64| n * ROUNDING as f64 / (1.0 - n * ROUNDING as f64);
-    let sheared = Sheared::new(ray, block, lane);
-    let largest = |c: [f32; 3]| c.iter().fold(0.0, |m: f32, c| m.max(c.abs())) as f64;
-    let (x, y, z) = (largest(sheared.x), largest(sheared.y), largest(sheared.z));
-    let [error_x, error_y] = sheared.error;
-    let error_z = gamma(3.0) * z;
-    let edges = sheared.edges();
-    let e = edges.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
-    let error_e = 2.0 * (gamma(2.0) * x * y + error_y * x + error_x * y);
-    let det = (edges[0] + edges[1] + edges[2]).abs();
-    // 18: the longest chain of roundings between the areas and `t`; some two of the areas make up two thirds of `det`.
-    (3.0 * (gamma(18.0) * e * z + error_e * z + error_z * e) / det) as f32
+/// Where the ray meets a triangle's plane, and how far off that may be; in double precision, straight from the vertices.
+///
+/// Decides whether a hit lies in front of the ray's origin, or before its end, when single precision cannot tell.
+#[inline(never)]
+pub(super) fn exact_t(ray: &Prepared, block: &TriangleBlock, lane: usize) -> (f64, f64) {
+    let origin = DVec3::from_array(ray.origin.map(f64::from));
+    let direction = DVec3::from_array(ray.direction.map(f64::from));
+    let [a, b, c] = &block.vertices;
+    let relative = |vertex: &[[f32; LANES]; 3]| {
+        DVec3::new(f64::from(vertex[0][lane]), f64::from(vertex[1][lane]), f64::from(vertex[2][lane]))
+            - origin
+    };
+    let (a, b, c) = (relative(a), relative(b), relative(c));
+    let (ab, ac) = (b - a, c - a);
+    let normal = ab.cross(ac);
+    let slope = normal.dot(direction).recip();
+    // Some ten roundings of terms that are no larger than this product.
+    let size = ab.length_squared() * ac.length_squared() * a.length_squared();
+    (normal.dot(a) * slope, 8.0 * f64::EPSILON * (size.sqrt() * slope).abs())
 }

@@ -214,6 +214,42 @@ fn bad_triangles_and_instances_are_dropped_and_counted() {
 }
 
 #[test]
+fn twins_cost_nothing_but_are_there_for_a_filter() {
+    let mut mesh = soup(1, 1.0, &mut Random(5));
+    mesh.1 = vec![[0, 1, 2]; 1_000_000];
+    let centre = mesh.0.iter().sum::<Vec3>() / 3.0;
+    let ray = Ray::new(centre + Vec3::new(0.3, 0.1, 2.0), Vec3::new(-0.3, -0.1, -2.0));
+    let away = Affine3A::from_translation(Vec3::X * 100.0);
+    let once = vec![(0, Affine3A::IDENTITY)];
+    for instances in [once, vec![(0, away), (0, Affine3A::IDENTITY)]] {
+        let accel = build(std::slice::from_ref(&mesh), &instances);
+        let instance = instances.len() as u32 - 1;
+        let find = |accept: &dyn Fn(u32) -> bool| {
+            let hit = accel.closest_where(&ray, &|hit| accept(hit.triangle));
+            assert_eq!(accel.occluded_where(&ray, &|hit| accept(hit.triangle)), hit.is_some());
+            hit.map(|hit| (hit.instance, hit.triangle))
+        };
+        assert_eq!(find(&|_| true), Some((instance, 0)));
+        assert_eq!(find(&|triangle| triangle > 0), Some((instance, 1)));
+        assert_eq!(find(&|triangle| triangle >= 999_999), Some((instance, 999_999)));
+        assert_eq!(find(&|_| false), None);
+        let blocks = accel.baked.iter().chain(&accel.shared).map(|tree| tree.blocks.len());
+        assert_eq!(blocks.sum::<usize>(), 1);
+        (0..10_000).for_each(|_| assert!(accel.closest(&ray).is_some()));
+    }
+}
+
+#[test]
+fn slivers_that_would_fill_their_boxes_badly_are_not_baked() {
+    let mesh = soup(5000, 0.02, &mut Random(6));
+    let turned = Affine3A::from_quat(Quat::from_scaled_axis(Vec3::new(0.3, 0.5, 0.7)));
+    let stretched = turned * Affine3A::from_scale(Vec3::new(1.0, 1e-3, 40.0));
+    for (to_world, is_baked) in [(turned, true), (stretched, false)] {
+        assert_eq!(build(std::slice::from_ref(&mesh), &[(0, to_world)]).is_baked(0), is_baked);
+    }
+}
+
+#[test]
 fn nothing_at_all() {
     let empty = (vec![], vec![]);
     for accel in [

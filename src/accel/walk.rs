@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use super::kernel::{Candidates, Entry, Instance, Kernel, LEAF, Node, Stack, Tree, TriangleBlock, WIDTH};
-use super::ray::{Prepared, exact_test, t_error};
+use super::ray::{Prepared, exact_t, exact_test};
+use super::twins::twins_of;
 use super::{Accel, Hit, Ray};
 
 /// What a query has found so far.
@@ -21,6 +22,7 @@ impl<F: Fn(&Hit) -> bool, const ANY: bool> Query<'_, F, ANY> {
     fn candidates(
         &mut self,
         ray: &Prepared,
+        tree: &Tree,
         block: &TriangleBlock,
         mut found: Candidates,
         instance: Option<u32>,
@@ -43,21 +45,48 @@ impl<F: Fn(&Hit) -> bool, const ANY: bool> Query<'_, F, ANY> {
                 u: found.u[lane],
                 v: found.v[lane],
             };
+            let doubtful = found.near_start | if ANY { found.near_end } else { 0 };
             let in_range = hit.t >= ray.t_min && hit.t <= self.t_max;
             if in_range
                 && self.wins(&hit)
-                && (found.near_start & bit == 0 || hit.t > t_error(ray, block, lane))
-                && (!ANY || found.near_end & bit == 0 || hit.t + t_error(ray, block, lane) < self.t_end)
-                && (self.accept)(&hit)
+                && (doubtful & bit == 0 || self.is_certain(ray, block, lane, found.near_start & bit != 0))
             {
-                if ANY {
+                if (self.accept)(&hit) {
+                    self.take(hit);
+                } else {
+                    self.try_twins(tree, (block.instance[lane], block.triangle[lane]), hit);
+                }
+                if ANY && self.best.is_some() {
                     return true;
                 }
-                self.t_max = hit.t;
-                self.best = Some(hit);
             }
         }
         false
+    }
+
+    /// Whether the hit certainly lies in front of the origin and, if any hit will do, before the end.
+    #[inline(always)]
+    fn is_certain(&self, ray: &Prepared, block: &TriangleBlock, lane: usize, near_start: bool) -> bool {
+        let (t, error) = exact_t(ray, block, lane);
+        (!near_start || t > error) && (!ANY || t + error < f64::from(self.t_end))
+    }
+
+    fn take(&mut self, hit: Hit) {
+        self.t_max = hit.t;
+        self.best = Some(hit);
+    }
+
+    /// Offers the filter the other triangles at the place of one that it refused.
+    #[inline(never)]
+    fn try_twins(&mut self, tree: &Tree, refused: (u32, u32), hit: Hit) {
+        let is_shared = refused.0 == u32::MAX;
+        for twin in twins_of(&tree.twins, refused) {
+            let instance = if is_shared { hit.instance } else { twin.id.0 };
+            let hit = Hit { instance, triangle: twin.id.1, ..hit };
+            if self.wins(&hit) && (self.accept)(&hit) {
+                return self.take(hit);
+            }
+        }
     }
 
     /// Whether `hit`, no farther than `t_max`, is to replace the best one.
@@ -108,7 +137,7 @@ impl<K: Kernel, F: Fn(&Hit) -> bool, const ANY: bool> Leaves<K> for Triangles<'_
     fn visit(&mut self, leaf: u32) -> bool {
         let block = &self.tree.blocks[leaf as usize];
         match self.kernel.triangles(self.ray, block, self.query.t_max) {
-            Some(found) => self.query.candidates(self.ray, block, found, self.instance),
+            Some(found) => self.query.candidates(self.ray, self.tree, block, found, self.instance),
             None => false,
         }
     }
@@ -166,29 +195,20 @@ fn walk<K: Kernel, L: Leaves<K>, const ANY: bool>(
         if current & LEAF == 0 {
             let node = &nodes[current as usize];
             let mut mask = kernel.boxes(lanes, node, leaves.t_max(), &mut near);
-            let mut found = [Entry::default(); WIDTH];
-            let mut count = 0;
-            while mask != 0 {
-                let child = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                let reference = node.children[child];
-                if reference & LEAF == 0 {
-                    kernel.prefetch(nodes, reference as usize);
-                } else {
-                    leaves.prefetch(reference ^ LEAF);
-                }
-                let new = Entry::new(near[child], reference);
-                let mut place = count;
-                while !ANY && place > 0 && found[place - 1] < new {
-                    found[place] = found[place - 1];
-                    place -= 1;
-                }
-                found[place] = new;
-                count += 1;
-            }
-            if count > 0 {
-                found[..count - 1].iter().for_each(|&entry| stack.push(entry));
-                current = found[count - 1].child();
+            if mask != 0 {
+                let next = || {
+                    let child = mask.trailing_zeros() as usize % WIDTH;
+                    mask &= mask - 1;
+                    let reference = node.children[child];
+                    if reference & LEAF == 0 {
+                        kernel.prefetch(nodes, reference as usize);
+                    } else {
+                        leaves.prefetch(reference ^ LEAF);
+                    }
+                    (Entry::new(near[child], reference), mask == 0)
+                };
+                current =
+                    if ANY { push_all(&mut stack, next) } else { push_sorted(&mut stack, next) }.child();
                 continue;
             }
         } else if leaves.visit(current ^ LEAF) {
@@ -196,12 +216,67 @@ fn walk<K: Kernel, L: Leaves<K>, const ANY: bool>(
         }
         current = loop {
             match stack.pop() {
-                Some(entry) if entry.near() <= leaves.t_max() => break entry.child(),
+                Some(entry) if ANY || entry.near() <= leaves.t_max() => break entry.child(),
                 Some(_) => {}
                 None => return false,
             }
         };
     }
+}
+
+/// Pushes all but the last of the entries that `next` returns, with a flag at the last one; returns that.
+#[inline(always)]
+fn push_all(stack: &mut Stack, mut next: impl FnMut() -> (Entry, bool)) -> Entry {
+    loop {
+        let (entry, is_last) = next();
+        if is_last {
+            return entry;
+        }
+        stack.push(entry);
+    }
+}
+
+/// The same, but the nearest is returned, and the nearer an entry the later it is pushed.
+#[inline(always)]
+fn push_sorted(stack: &mut Stack, mut next: impl FnMut() -> (Entry, bool)) -> Entry {
+    let order = |a: Entry, b: Entry| (a.min(b), a.max(b));
+    let (a, is_last) = next();
+    if is_last {
+        return a;
+    }
+    let (b, is_last) = next();
+    let (a, b) = order(a, b);
+    if is_last {
+        stack.push(b);
+        return a;
+    }
+    let (c, is_last) = next();
+    let (b, c) = order(b, c);
+    let (a, b) = order(a, b);
+    if is_last {
+        stack.push(c);
+        stack.push(b);
+        return a;
+    }
+    // Four or more are rare: insertion.
+    let mut sorted = [Entry::default(); WIDTH];
+    (sorted[0], sorted[1], sorted[2]) = (c, b, a);
+    let mut count = 3;
+    loop {
+        let (entry, is_last) = next();
+        let mut place = count;
+        while place > 0 && sorted[place - 1] < entry {
+            sorted[place] = sorted[place - 1];
+            place -= 1;
+        }
+        sorted[place] = entry;
+        count += 1;
+        if is_last {
+            break;
+        }
+    }
+    sorted[..count - 1].iter().for_each(|&entry| stack.push(entry));
+    sorted[count - 1]
 }
 
 /// The ray in the space of an instance's mesh; `t` stays the same.

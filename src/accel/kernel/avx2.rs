@@ -48,6 +48,40 @@ pub(in super::super) struct Lanes {
     negative: [usize; 3],
 }
 
+/// One vertex of four triangles as the ray sees it: relative to its origin, and sheared so that it runs along `z`.
+#[derive(Clone, Copy)]
+struct Sheared {
+    x: __m128,
+    y: __m128,
+    /// Before it is scaled.
+    z: __m128,
+}
+
+impl Sheared {
+    #[inline(always)]
+    fn new(ray: &Prepared, vertex: &[[f32; LANES]; 3]) -> Self {
+        let [kx, ky, kz] = ray.axes;
+        // SAFETY: SSE is part of x86-64; each load reads an array of four.
+        unsafe {
+            let x = _mm_sub_ps(_mm_loadu_ps(vertex[kx].as_ptr()), _mm_set1_ps(ray.origin[kx]));
+            let y = _mm_sub_ps(_mm_loadu_ps(vertex[ky].as_ptr()), _mm_set1_ps(ray.origin[ky]));
+            let z = _mm_sub_ps(_mm_loadu_ps(vertex[kz].as_ptr()), _mm_set1_ps(ray.origin[kz]));
+            Self {
+                x: _mm_sub_ps(x, _mm_mul_ps(_mm_set1_ps(ray.shear[0]), z)),
+                y: _mm_sub_ps(y, _mm_mul_ps(_mm_set1_ps(ray.shear[1]), z)),
+                z,
+            }
+        }
+    }
+
+    /// Signed doubled area of the triangle that the vertex, the next one and the ray span.
+    #[inline(always)]
+    fn area(self, next: Self) -> __m128 {
+        // SAFETY: SSE is part of x86-64.
+        unsafe { _mm_sub_ps(_mm_mul_ps(self.x, next.y), _mm_mul_ps(self.y, next.x)) }
+    }
+}
+
 // The methods are always inlined into the functions above, where AVX2 is enabled; each `unsafe` call of an intrinsic
 // is sound because `self` proves that the processor has it.
 impl Kernel for Avx2 {
@@ -97,57 +131,47 @@ impl Kernel for Avx2 {
 
     #[inline(always)]
     fn triangles(self, ray: &Prepared, block: &TriangleBlock, t_max: f32) -> Option<Candidates> {
-        let [kx, ky, kz] = ray.axes;
-        // SAFETY: AVX2 is there; loads read one array of four each, aligned to 16 bytes as the block is; the stores
-        // write arrays of four.
+        let [a, b, c] = &block.vertices;
+        let (a, b, c) = (Sheared::new(ray, a), Sheared::new(ray, b), Sheared::new(ray, c));
+        // SAFETY: SSE is part of x86-64, and the stores write arrays of four.
         unsafe {
-            let relative = |axis: usize| {
-                let origin = _mm_set1_ps(ray.origin[axis]);
-                [0, 1, 2].map(|i| _mm_sub_ps(_mm_load_ps(block.vertices[i][axis].as_ptr()), origin))
-            };
-            let (px, py, pz) = (relative(kx), relative(ky), relative(kz));
-            let [sx, sy, sz] = ray.shear.map(|s| _mm_set1_ps(s));
-            let x = [0, 1, 2].map(|i| _mm_sub_ps(px[i], _mm_mul_ps(sx, pz[i])));
-            let y = [0, 1, 2].map(|i| _mm_sub_ps(py[i], _mm_mul_ps(sy, pz[i])));
-            let edge = |a: usize, b: usize| _mm_sub_ps(_mm_mul_ps(x[a], y[b]), _mm_mul_ps(y[a], x[b]));
-            let e = [edge(1, 2), edge(2, 0), edge(0, 1)];
+            let (ea, eb, ec) = (b.area(c), c.area(a), a.area(b));
             let zero = _mm_setzero_ps();
-            let lowest = _mm_min_ps(_mm_min_ps(e[0], e[1]), e[2]);
-            let highest = _mm_max_ps(_mm_max_ps(e[0], e[1]), e[2]);
+            let lowest = _mm_min_ps(_mm_min_ps(ea, eb), ec);
+            let highest = _mm_max_ps(_mm_max_ps(ea, eb), ec);
             let inside = _mm_or_ps(_mm_cmpge_ps(lowest, zero), _mm_cmple_ps(highest, zero));
             if _mm_movemask_ps(inside) == 0 {
                 return None;
             }
-            let z = [0, 1, 2].map(|i| _mm_mul_ps(sz, pz[i]));
-            let scale = _mm_div_ps(_mm_set1_ps(1.0), _mm_add_ps(_mm_add_ps(e[0], e[1]), e[2]));
-            let b = [0, 1, 2].map(|i| _mm_mul_ps(e[i], scale));
-            let slope = |i: usize| _mm_mul_ps(b[i], _mm_sub_ps(z[i], z[0]));
-            let t = _mm_add_ps(z[0], _mm_add_ps(slope(1), slope(2)));
-            let end = _mm_set1_ps(t_max);
-            let in_range = _mm_and_ps(_mm_cmpge_ps(t, _mm_set1_ps(ray.t_min)), _mm_cmple_ps(t, end));
-            let is_zero = [0, 1, 2].map(|i| _mm_cmpeq_ps(e[i], zero));
-            let on_edge = _mm_and_ps(inside, _mm_or_ps(_mm_or_ps(is_zero[0], is_zero[1]), is_zero[2]));
+            let scale = _mm_set1_ps(ray.shear[2]);
+            let (za, zb, zc) = (_mm_mul_ps(scale, a.z), _mm_mul_ps(scale, b.z), _mm_mul_ps(scale, c.z));
+            let scale = _mm_div_ps(_mm_set1_ps(1.0), _mm_add_ps(_mm_add_ps(ea, eb), ec));
+            let (u, v) = (_mm_mul_ps(eb, scale), _mm_mul_ps(ec, scale));
+            let slopes = _mm_add_ps(_mm_mul_ps(u, _mm_sub_ps(zb, za)), _mm_mul_ps(v, _mm_sub_ps(zc, za)));
+            let t = _mm_add_ps(za, slopes);
+            let nearest = _mm_min_ps(_mm_min_ps(za, zb), zc);
+            let farthest = _mm_max_ps(_mm_max_ps(za, zb), zc);
+            let near_start = _mm_cmple_ps(nearest, zero);
+            let in_range =
+                _mm_and_ps(_mm_cmpge_ps(t, _mm_set1_ps(ray.t_min)), _mm_cmple_ps(t, _mm_set1_ps(t_max)));
+            let is_zero = _mm_or_ps(_mm_cmpeq_ps(lowest, zero), _mm_cmpeq_ps(highest, zero));
             let hit = _mm_movemask_ps(_mm_and_ps(inside, in_range)) as u32;
-            let on_edge = _mm_movemask_ps(on_edge) as u32;
+            let on_edge = _mm_movemask_ps(_mm_and_ps(inside, is_zero)) as u32;
             if hit | on_edge == 0 {
                 return None;
             }
-            let in_front = _mm_cmpgt_ps(_mm_min_ps(_mm_min_ps(z[0], z[1]), z[2]), zero);
-            let before_end =
-                _mm_cmplt_ps(_mm_max_ps(_mm_max_ps(z[0], z[1]), z[2]), _mm_set1_ps(t_max * NEARER));
-            let inside = _mm_movemask_ps(inside) as u32;
             let mut found = Candidates {
                 t: [0.0; LANES],
                 u: [0.0; LANES],
                 v: [0.0; LANES],
                 hit,
                 on_edge,
-                near_start: inside & !(_mm_movemask_ps(in_front) as u32),
-                near_end: inside & !(_mm_movemask_ps(before_end) as u32),
+                near_start: _mm_movemask_ps(near_start) as u32,
+                near_end: _mm_movemask_ps(_mm_cmpge_ps(farthest, _mm_set1_ps(t_max * NEARER))) as u32,
             };
             _mm_storeu_ps(found.t.as_mut_ptr(), t);
-            _mm_storeu_ps(found.u.as_mut_ptr(), b[1]);
-            _mm_storeu_ps(found.v.as_mut_ptr(), b[2]);
+            _mm_storeu_ps(found.u.as_mut_ptr(), u);
+            _mm_storeu_ps(found.v.as_mut_ptr(), v);
             Some(found)
         }
     }

@@ -5,11 +5,14 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+mod memory;
 mod portable;
 mod stack;
 
 use super::ray::Prepared;
+use super::twins::Twin;
 use super::{Accel, Hit, Ray, walk};
+pub(super) use memory::compact;
 pub(super) use stack::{Entry, Stack};
 
 /// Children of a node.
@@ -65,12 +68,16 @@ pub(super) struct Tree {
     /// The root comes first.
     pub nodes: Vec<Node>,
     pub blocks: Vec<TriangleBlock>,
+    /// Triangles that others in `blocks` stand in for, in ascending order.
+    pub twins: Vec<Twin>,
 }
 
 impl Tree {
     /// Heap memory held, in bytes.
     pub fn memory_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Node>() + self.blocks.capacity() * size_of::<TriangleBlock>()
+        self.nodes.capacity() * size_of::<Node>()
+            + self.blocks.capacity() * size_of::<TriangleBlock>()
+            + self.twins.capacity() * size_of::<Twin>()
     }
 }
 

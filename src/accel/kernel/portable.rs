@@ -52,7 +52,6 @@ impl Kernel for Portable {
             near_start: 0,
             near_end: 0,
         };
-        let certain_end = t_max * NEARER;
         for lane in 0..LANES {
             let relative = |axis: usize| block.vertices.map(|vertex| vertex[axis][lane] - ray.origin[axis]);
             let (px, py, pz) = (relative(kx), relative(ky), relative(kz));
@@ -70,10 +69,14 @@ impl Kernel for Portable {
             let t = z[0] + (b[1] * (z[1] - z[0]) + b[2] * (z[2] - z[0]));
             (found.t[lane], found.u[lane], found.v[lane]) = (t, b[1], b[2]);
             let bit = 1 << lane;
-            found.on_edge |= if e.contains(&0.0) { bit } else { 0 };
-            found.hit |= if t >= ray.t_min && t <= t_max { bit } else { 0 };
-            found.near_start |= if min(min(z[0], z[1]), z[2]) > 0.0 { 0 } else { bit };
-            found.near_end |= if max(max(z[0], z[1]), z[2]) < certain_end { 0 } else { bit };
+            found.on_edge |= if lowest == 0.0 || highest == 0.0 { bit } else { 0 };
+            let nearest = min(min(z[0], z[1]), z[2]);
+            let farthest = max(max(z[0], z[1]), z[2]);
+            let near_start = nearest <= 0.0;
+            let in_range = t >= ray.t_min && t <= t_max;
+            found.hit |= if in_range { bit } else { 0 };
+            found.near_start |= if near_start { bit } else { 0 };
+            found.near_end |= if farthest >= t_max * NEARER { bit } else { 0 };
         }
         (found.hit | found.on_edge != 0).then_some(found)
     }
