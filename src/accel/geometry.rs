@@ -33,6 +33,12 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// Half the surface area.
+    pub fn half_area(&self) -> f32 {
+        let size = self.max - self.min;
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
     fn size(&self) -> DVec3 {
         (self.max - self.min).as_dvec3()
     }

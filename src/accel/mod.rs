@@ -12,6 +12,7 @@
 //! * A triangle is hit only where it is certain to lie in front of the ray's origin, so rays that leave a surface from
 //!   [`offset::SurfacePoint::spawn`] never meet it again and need no fixed epsilon.
 
+mod binary;
 mod build;
 mod collapse;
 mod geometry;

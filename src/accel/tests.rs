@@ -239,6 +239,41 @@ fn twins_cost_nothing_but_are_there_for_a_filter() {
     }
 }
 
+/// Triangles in the plane x = `at(i).x` with their right angle at `at(i)` and legs of length `size(i)`.
+fn triangles(count: u32, at: impl Fn(f32) -> Vec3, size: impl Fn(f32) -> f32) -> Mesh {
+    let corners = |i| [at(i), at(i) + Vec3::Y * size(i), at(i) + Vec3::Z * size(i)];
+    let positions = (0..count).flat_map(|i| corners(i as f32)).collect();
+    (positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+}
+
+#[test]
+fn evenly_spaced_and_nested_triangles_do_not_stall_the_build() {
+    // Where clustering or reinsertion take quadratic time on these, the test takes minutes.
+    const COUNT: u32 = 100_000;
+    let place = [(0, Affine3A::IDENTITY)];
+    let row = build(&[triangles(COUNT, |i| Vec3::X * i, |_| 1.0)], &place);
+    let nested = build(&[triangles(COUNT, |_| Vec3::ZERO, |i| 1.0 + 1e-6 * i)], &place);
+    let stairs = build(&[triangles(COUNT / 4, |_| Vec3::ZERO, |i| 1.0 + i)], &place);
+    for accel in [row, nested, stairs] {
+        let ray = Ray::new(Vec3::new(-1.0, 0.2, 0.2), Vec3::X);
+        assert_eq!(accel.closest(&ray).map(|hit| (hit.t, hit.triangle)), Some((1.0, 0)));
+    }
+}
+
+#[test]
+fn a_million_instances() {
+    let side = 1000;
+    let at = |i: u32| Vec3::new((i % side) as f32, (i / side) as f32, 0.0) * 3.0;
+    let instances: Vec<_> = (0..side * side).map(|i| (0, Affine3A::from_translation(at(i)))).collect();
+    let accel = build(&[triangles(8, |i| Vec3::X * 0.1 * i, |_| 1.0)], &instances);
+    assert!(accel.memory_bytes() < 200 << 20, "{} bytes", accel.memory_bytes());
+    for i in (0..side * side).step_by(997) {
+        let ray = Ray::new(at(i) + Vec3::new(-0.5, 0.2, 0.2), Vec3::X);
+        let hit = accel.closest(&ray).map(|hit| (hit.instance, hit.triangle));
+        assert_eq!(hit, Some((i, 0)));
+    }
+}
+
 #[test]
 fn slivers_that_would_fill_their_boxes_badly_are_not_baked() {
     let mesh = soup(5000, 0.02, &mut Random(6));
