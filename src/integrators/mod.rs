@@ -62,9 +62,18 @@ pub struct Context<'a> {
     pub tile_done: &'a (dyn Fn(Rect) + Sync),
 }
 
+/// How an iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IterationEnd {
+    /// All of its samples are in the film.
+    Complete,
+    /// The stop sign cut it short.
+    CutShort,
+}
+
 /// One method of computing light transport.
 pub trait Integrator: Send {
     /// Adds about one sample a pixel to the film. May return early, with whole samples only, when the
-    /// stop sign is raised.
-    fn iterate(&mut self, context: &Context, iteration: u32);
+    /// stop sign is raised. `index` counts the calls, for the random numbers.
+    fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd;
 }

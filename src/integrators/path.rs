@@ -4,7 +4,7 @@
 //! light and by following the BSDF to one; both are weighted by the power heuristic (Veach 1997, section
 //! 9.2). Paths end by Russian roulette, which leaves the mean as it is, or where nothing is hit.
 
-use super::{Context, Integrator};
+use super::{Context, Integrator, IterationEnd};
 use crate::film::{FirstHit, Sample, SharedTile};
 use crate::math::Sampler;
 use crate::shading::bsdf::{Bsdf, Walk};
@@ -12,7 +12,7 @@ use crate::shading::emitters::Receiver;
 use crate::shading::lobes::Density;
 use crate::shading::{CameraRay, LightPoint, Piece, Shaded, SurfacePoint, Vertex, World};
 use glam::{Vec2, Vec3};
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The path tracer.
 #[derive(Debug, Default)]
@@ -25,33 +25,38 @@ const ROULETTE_ALWAYS_FROM: u32 = 64;
 const MAX_SURVIVAL: f32 = 0.99;
 
 impl Integrator for Path {
-    fn iterate(&mut self, context: &Context, iteration: u32) {
+    fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd {
         use rayon::prelude::*;
+        let cut_short = AtomicBool::new(false);
         context.film.par_tiles().for_each(|tile| {
-            if !context.stop.is_raised() {
-                render_tile(context, iteration, tile);
-                (context.tile_done)(tile.rect());
+            if !render_tile(context, index, tile) {
+                cut_short.store(true, Relaxed);
             }
+            (context.tile_done)(tile.rect());
         });
+        if cut_short.into_inner() { IterationEnd::CutShort } else { IterationEnd::Complete }
     }
 }
 
-fn render_tile(context: &Context, iteration: u32, shared: &SharedTile) {
-    let mut rays = 0;
+/// Returns whether all its pixels were sampled.
+fn render_tile(context: &Context, index: u32, shared: &SharedTile) -> bool {
+    let (mut rays, mut complete) = (0, true);
     let mut tile = shared.lock();
     for (x, y) in shared.rect().pixels() {
         if context.stop.is_raised() {
+            complete = false;
             break;
         }
         let (full_x, full_y) = (x + context.crop.x, y + context.crop.y);
         let stream = full_y.wrapping_mul(1 << 16) ^ full_x;
         // even and odd samples are two independent sequences, as the film's two halves must be
-        let sampler = Sampler::new(context.seed ^ ((iteration & 1) << 31), stream, iteration >> 1);
+        let sampler = Sampler::new(context.seed ^ ((index & 1) << 31), stream, index >> 1);
         let mut walk = PathWalk { context, sampler, rays: 0 };
         tile.add(x, y, &walk.sample(Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5)));
         rays += walk.rays;
     }
     context.counters.rays.fetch_add(rays, Relaxed);
+    complete
 }
 
 /// The state of the walk along one path.

@@ -7,7 +7,7 @@ pub mod statistics;
 
 use crate::film::{Film, FilmError, Rect};
 use crate::integrators::path::Path;
-use crate::integrators::{Context, Counters, Integrator, StopSign};
+use crate::integrators::{Context, Counters, Integrator, IterationEnd, StopSign};
 use crate::scene::{Scene, SceneError};
 use crate::shading::{BuildCost, Sensor, World, WorldError};
 use clock::Stopwatch;
@@ -80,6 +80,9 @@ pub struct Session {
 
 /// What changes from iteration to iteration.
 struct State {
+    /// Iterations that were begun: their random numbers are spent.
+    begun: u32,
+    /// Iterations that came to their end.
     iterations: u32,
     seconds: f64,
     cpu_seconds: f64,
@@ -126,6 +129,7 @@ impl Session {
             stop: StopSign::default(),
             cancelled: AtomicBool::new(false),
             state: Mutex::new(State {
+                begun: 0,
                 iterations: 0,
                 seconds: 0.0,
                 cpu_seconds: 0.0,
@@ -231,15 +235,22 @@ impl Session {
         };
         let limits = self.settings.limits;
         loop {
-            let iteration = locked(&self.state).iterations;
-            if limits.samples.is_some_and(|n| iteration >= n) {
+            let (iterations, index) = {
+                let state = locked(&self.state);
+                (state.iterations, state.begun)
+            };
+            if limits.samples.is_some_and(|n| iterations >= n) {
                 self.note(watch, before, cpu_before, true);
                 return StopReason::Samples;
             }
             if !self.stop.is_raised() {
-                self.pool.install(|| integrator.iterate(&context, iteration));
-                // one that was cut short counts too: its samples must not be drawn again
-                locked(&self.state).iterations = iteration.saturating_add(1);
+                let end = self.pool.install(|| integrator.iterate(&context, index));
+                let mut state = locked(&self.state);
+                // one that was cut short is begun too: its samples must not be drawn again
+                state.begun = index.saturating_add(1);
+                if end == IterationEnd::Complete {
+                    state.iterations = iterations.saturating_add(1);
+                }
             }
             if self.stop.is_raised() {
                 self.note(watch, before, cpu_before, true);

@@ -5,6 +5,7 @@
 //! over it. That the density integrates to the share of draws which return something is told apart.
 
 use glam::{DVec2, DVec3};
+use segue::math::Frame;
 use segue::math::sampler::{hash, hash_unit};
 use std::f64::consts::{PI, TAU};
 
@@ -30,12 +31,14 @@ pub enum Chart {
     /// Longitude and latitude around the y axis of the half vector with the given direction: for what
     /// is reflected only.
     Half(Vec3),
+    /// Azimuth and angle around an axis, one for the directions above and one for those below the surface.
+    Peaks(Frame, Frame),
 }
 
 impl Chart {
     fn low(self) -> DVec2 {
         match self {
-            Self::Direction => DVec2::ZERO,
+            Self::Direction | Self::Peaks(..) => DVec2::ZERO,
             Self::Half(_) => DVec2::splat(-0.5 * PI),
         }
     }
@@ -44,40 +47,58 @@ impl Chart {
         match self {
             Self::Direction => DVec2::new(TAU, PI),
             Self::Half(_) => DVec2::splat(0.5 * PI),
+            Self::Peaks(..) => DVec2::splat(TAU),
         }
     }
 
     fn coordinates(self, w: Vec3) -> DVec2 {
         match self {
-            Self::Direction => {
-                let w = w.as_dvec3();
-                let phi = w.y.atan2(w.x);
-                DVec2::new(if phi < 0.0 { phi + TAU } else { phi }, w.truncate().length().atan2(w.z))
-            }
+            Self::Direction => polar(w.as_dvec3()),
             Self::Half(o) => {
                 let h = (o + w).as_dvec3().normalize() * f64::from(1f32.copysign(o.z));
                 DVec2::new(h.x.atan2(h.z), h.y.asin())
             }
+            Self::Peaks(above, _) if w.z >= 0.0 => polar(local(&above, w)),
+            Self::Peaks(_, below) => polar(local(&below, w)) + DVec2::new(0.0, PI),
         }
     }
 
-    /// The direction, and the solid angle per area of the chart.
-    fn direction(self, c: DVec2) -> (Vec3, f64) {
+    /// The direction, and the solid angle per area of the chart; `None` where there is none.
+    fn direction(self, c: DVec2) -> Option<(Vec3, f64)> {
         match self {
-            Self::Direction => {
-                let ((sp, cp), (st, ct)) = (c.x.sin_cos(), c.y.sin_cos());
-                (DVec3::new(st * cp, st * sp, ct).as_vec3(), st)
-            }
+            Self::Direction => Some((spherical(c).as_vec3(), c.y.sin())),
             Self::Half(o) => {
                 let ((sx, cx), (sy, cy)) = (c.x.sin_cos(), c.y.sin_cos());
                 let h = DVec3::new(sx * cy, sy, cx * cy) * f64::from(1f32.copysign(o.z));
                 let o = o.as_dvec3();
                 let cos = o.dot(h);
-                // on the far side of the half vector's horizon there is nothing
-                ((2.0 * cos * h - o).as_vec3(), (4.0 * cos * cy).max(0.0))
+                (cos > 0.0).then(|| ((2.0 * cos * h - o).as_vec3(), 4.0 * cos * cy))
+            }
+            Self::Peaks(above, below) => {
+                let up = c.y < PI;
+                let (frame, y) = if up { (above, c.y) } else { (below, c.y - PI) };
+                let v = spherical(DVec2::new(c.x, y));
+                let axes = [frame.s, frame.t, frame.n].map(Vec3::as_dvec3);
+                let w = (axes[0] * v.x + axes[1] * v.y + axes[2] * v.z).as_vec3();
+                ((w.z >= 0.0) == up).then(|| (w, y.sin()))
             }
         }
     }
+}
+
+fn local(frame: &Frame, w: Vec3) -> DVec3 {
+    let w = w.as_dvec3();
+    DVec3::new(w.dot(frame.s.as_dvec3()), w.dot(frame.t.as_dvec3()), w.dot(frame.n.as_dvec3()))
+}
+
+fn polar(w: DVec3) -> DVec2 {
+    let phi = w.y.atan2(w.x);
+    DVec2::new(if phi < 0.0 { phi + TAU } else { phi }, w.truncate().length().atan2(w.z))
+}
+
+fn spherical(c: DVec2) -> DVec3 {
+    let ((sp, cp), (st, ct)) = (c.x.sin_cos(), c.y.sin_cos());
+    DVec3::new(st * cp, st * sp, ct)
 }
 
 /// What came out of a test.
@@ -216,33 +237,36 @@ impl<L: Draws> Integrator<'_, L> {
     /// Over one part. A first look decides whether its quarters are taken apart, and is then forgotten:
     /// an estimate that took part in the decision would be biased.
     fn plain(&mut self, part: Cell, depth: u32) -> Estimate {
-        let half = 0.5 * (part.high - part.low);
-        let quarters = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|q| {
-            let low = part.low + half * q;
-            Cell { low, high: low + half }
-        });
-        if depth > 0 && self.look(&quarters).variance > FINE * FINE {
+        if depth > 0 && self.look(part, 4).variance > FINE * FINE {
+            let half = 0.5 * (part.high - part.low);
             let mut sum = Estimate::default();
-            quarters.iter().for_each(|&q| sum += self.plain(q, depth - 1));
+            for q in [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE] {
+                let low = part.low + half * q;
+                sum += self.plain(Cell { low, high: low + half }, depth - 1);
+            }
             return sum;
         }
-        self.look(&quarters)
+        self.look(part, 3)
     }
 
-    /// The integral over four equal parts from one point in each. The differences between the parts are
-    /// left in the variance, which makes it an upper bound.
-    fn look(&mut self, parts: &[Cell; 4]) -> Estimate {
+    /// The integral over a part from one point in each of `side` by `side` equal pieces. The differences
+    /// between the pieces are left in the variance, which makes it an upper bound.
+    fn look(&mut self, part: Cell, side: u32) -> Estimate {
+        let size = (part.high - part.low) / f64::from(side);
+        let n = f64::from(side * side);
         let (mut sum, mut squares) = (0.0, 0.0);
-        for part in parts {
+        for k in 0..side * side {
             self.next += 1;
-            let size = part.high - part.low;
-            let a = part.low + size * uniform(self.next, 0x1e6).truncate().as_dvec2();
-            let (w, stretch) = self.lobe.chart().direction(a);
-            let f = if stretch > 0.0 { self.lobe.density(w) * stretch * size.x * size.y } else { 0.0 };
+            let corner = DVec2::new(f64::from(k % side), f64::from(k / side));
+            let c = part.low + size * (corner + uniform(self.next, 0x1e6).truncate().as_dvec2());
+            let f = match self.lobe.chart().direction(c) {
+                Some((w, stretch)) => self.lobe.density(w) * stretch * size.x * size.y,
+                None => 0.0,
+            };
             sum += f;
             squares += f * f;
         }
-        Estimate { mean: sum, variance: (4.0 * squares - sum * sum).max(0.0) / 3.0 }
+        Estimate { mean: sum, variance: (n * squares - sum * sum).max(0.0) / (n - 1.0) }
     }
 }
 

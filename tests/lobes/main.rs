@@ -5,25 +5,35 @@ mod table;
 
 use chi_square::{Chart, Draws, sidak, uniform};
 use glam::Vec3;
-use segue::math::Sampler;
+use segue::math::{Frame, Sampler};
 use segue::shading::lobes::{Density, Lobe, Side};
 use table::{Row, directions, rows};
 
 /// A lobe seen from one direction.
-struct Seen<'a>(&'a Lobe, Vec3);
+struct Seen<'a>(&'a Row, Vec3);
 
 impl Draws for Seen<'_> {
     fn draw(&self, u: Vec3) -> Option<Vec3> {
-        self.0.sample(self.1, u).map(|s| s.direction)
+        self.0.lobe.sample(self.1, u).map(|s| s.direction)
     }
 
     fn density(&self, w: Vec3) -> f64 {
-        f64::from(self.0.pdf(self.1, w).0) * f64::from(w.z.abs())
+        f64::from(self.0.lobe.pdf(self.1, w).0) * f64::from(w.z.abs())
     }
 
     fn chart(&self) -> Chart {
-        match self.0 {
+        match &self.0.lobe {
             Lobe::Reflection(_) => Chart::Half(self.1),
+            Lobe::Dielectric(lobe) if self.0.width < 0.05 => {
+                let from = self.1;
+                let mirrored = Vec3::new(-from.x, -from.y, from.z);
+                let eta = if from.z > 0.0 { lobe.eta() } else { 1.0 / lobe.eta() };
+                let across = -from.truncate() / eta;
+                let z = (1.0 - across.length_squared()).max(0.0).sqrt();
+                let refracted = across.extend(-z.copysign(from.z)).normalize();
+                let (above, below) = if from.z > 0.0 { (mirrored, refracted) } else { (refracted, mirrored) };
+                Chart::Peaks(Frame::from_normal(above), Frame::from_normal(below))
+            }
             _ => Chart::Direction,
         }
     }
@@ -43,7 +53,7 @@ fn samples_follow_their_density() {
     let limit = sidak(runs.len());
     let mut failures = Vec::new();
     for (k, (row, from)) in runs.iter().enumerate() {
-        let o = chi_square::test(&Seen(&row.lobe, *from), k as u32, 100_000);
+        let o = chi_square::test(&Seen(row, *from), k as u32, 100_000);
         // the density integrates to the share of draws that give a direction
         if o.p < limit || (o.mass - o.accepted).abs() > 4.5 * o.sigma + 1e-4 {
             failures.push(format!(
@@ -55,19 +65,27 @@ fn samples_follow_their_density() {
     assert!(failures.is_empty(), "{} of {} runs:\n{}", failures.len(), runs.len(), failures.join("\n"));
 }
 
-/// Mean weight of the draws, and its standard error.
-fn mean_weight(lobe: &Lobe, from: Vec3, seed: u32, n: u32) -> (Vec3, f32) {
-    let (mut sum, mut squares) = (glam::DVec3::ZERO, 0.0);
-    for i in 0..n {
-        if let Some(s) = lobe.sample(from, Sampler::new(seed, 0, i).next_3d()) {
-            let w = s.weight().as_dvec3();
-            sum += w;
-            squares += w.x * w.x;
+/// Mean weight of the draws, and its standard error: as many as it takes to make that small.
+fn mean_weight(lobe: &Lobe, from: Vec3, seed: u32) -> (Vec3, f32) {
+    const ROUNDS: [u32; 4] = [1 << 14, 1 << 16, 1 << 18, 1 << 20];
+    let (mut sum, mut squares, mut i, mut round) = (glam::DVec3::ZERO, 0.0, 0, 0);
+    loop {
+        let n = ROUNDS[round];
+        while i < n {
+            if let Some(s) = lobe.sample(from, Sampler::new(seed, 0, i).next_3d()) {
+                let w = s.weight().as_dvec3();
+                sum += w;
+                squares += w.x * w.x;
+            }
+            i += 1;
+        }
+        let mean = sum / f64::from(n);
+        let error = ((squares / f64::from(n) - mean.x * mean.x).max(0.0) / f64::from(n)).sqrt();
+        round += 1;
+        if error < 1.5e-3 || round == ROUNDS.len() {
+            return (mean.as_vec3(), error as f32);
         }
     }
-    let mean = sum / f64::from(n);
-    let error = ((squares / f64::from(n) - mean.x * mean.x).max(0.0) / f64::from(n)).sqrt();
-    (mean.as_vec3(), error as f32)
 }
 
 #[test]
@@ -75,8 +93,7 @@ fn energy_is_kept() {
     let rows = rows();
     let mut failures = Vec::new();
     for (k, (row, from)) in each_seen(&rows).into_iter().enumerate() {
-        let n = if row.lobe.is_delta() { 1 << 14 } else { 1 << 16 };
-        let (mean, error) = mean_weight(&row.lobe, from, k as u32, n);
+        let (mean, error) = mean_weight(&row.lobe, from, k as u32);
         let bad = if row.lossless {
             (mean - Vec3::ONE).abs().max_element() > 0.005
         } else {

@@ -1,14 +1,18 @@
 //! Reflection and refraction at a GGX microfacet interface between two dielectrics
 //! (Walter et al. 2007), tinted; smooth: mirror and refracted direction (delta).
 
-use super::fresnel::{dielectric, f0_from_ior};
+use super::energy::GlassLoss;
+use super::fresnel::{dielectric, f0_from_ior, reflectance};
 use super::{Finish, Ggx, Kind, LobeSample, MIN_COS};
+use crate::math::ONE_MINUS_EPSILON;
 use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
 
 /// Blur of the refracted light, alpha times `|eta - 1|`, below which the interface is treated as smooth.
 const SMOOTH_BLUR: f32 = 5e-4;
 
-/// A dielectric interface; z points out of the medium of index `eta`.
+/// A dielectric interface; z points out of the medium of index `eta`. Isotropic: of unequal alphas the
+/// mean is taken.
 #[derive(Clone, Copy, Debug)]
 pub struct Dielectric {
     ggx: Ggx,
@@ -21,6 +25,7 @@ pub struct Dielectric {
 #[derive(Clone, Copy, Debug)]
 enum Split {
     Fresnel {
+        loss: GlassLoss,
         /// Reflectance at normal incidence; the exact curve is stretched to begin here.
         f0: Vec3,
         reflection: Vec3,
@@ -42,6 +47,15 @@ struct Facet {
     cos_t: f32,
 }
 
+impl Facet {
+    /// The refraction of the upward `o` at the normal `m`, to which it has the cosine `c`.
+    #[inline]
+    fn refract(&self, o: Vec3, m: Vec3, c: f32) -> Option<Vec3> {
+        let possible = self.cos_t > 0.0 && self.choice < 1.0;
+        possible.then(|| (m * (c / self.eta - self.cos_t) - o / self.eta).normalize())
+    }
+}
+
 impl Dielectric {
     /// Clear glass of index `eta` (below over above). Lossless.
     pub fn new(ggx: Ggx, eta: f32) -> Self {
@@ -51,13 +65,15 @@ impl Dielectric {
     /// With its own reflectance at normal incidence, and with factors on what is reflected and what is
     /// transmitted.
     pub fn tinted(ggx: Ggx, eta: f32, f0: Vec3, reflection: Vec3, transmission: Vec3) -> Self {
-        Self::with_split(ggx, eta, Split::Fresnel { f0, reflection, transmission })
+        let ggx = ggx.isotropic();
+        let loss = GlassLoss::new(&ggx, eta);
+        Self::with_split(ggx, eta, Split::Fresnel { loss, f0, reflection, transmission })
     }
 
     /// Refraction without Fresnel reflection; light that would be totally reflected is absorbed, and
     /// what a rough surface scatters more than once is lost.
     pub fn refraction_only(ggx: Ggx, eta: f32) -> Self {
-        Self::with_split(ggx, eta, Split::RefractionOnly)
+        Self::with_split(ggx.isotropic(), eta, Split::RefractionOnly)
     }
 
     fn with_split(ggx: Ggx, eta: f32, split: Split) -> Self {
@@ -93,36 +109,53 @@ impl Dielectric {
         if o.z < MIN_COS {
             return None;
         }
-        let delta = self.is_delta();
-        let m = if delta { Vec3::Z } else { self.ggx.sample_visible(o, u.truncate()) };
+        if self.is_delta() {
+            return self.sample_smooth(o, sign, u.z);
+        }
+        let i = self.draw(o, sign, u)?;
+        let (value, pdf) = self.terms(from, i * sign);
+        let (kind, eta) = if i.z > 0.0 {
+            (Kind::reflection(Finish::Glossy), 1.0)
+        } else {
+            (Kind::transmission(Finish::Glossy), self.relative_index(sign))
+        };
+        LobeSample::continuous(i * sign, value, pdf, eta, kind)
+    }
+
+    #[inline]
+    fn sample_smooth(&self, o: Vec3, sign: f32, u: f32) -> Option<LobeSample> {
+        let facet = self.facet(o.z, sign);
+        if u < facet.choice {
+            let i = Vec3::new(-o.x, -o.y, o.z);
+            let kind = Kind::reflection(Finish::Specular);
+            return Some(LobeSample::delta(i * sign, facet.reflection, facet.choice, 1.0, kind));
+        }
+        let i = facet.refract(o, Vec3::Z, o.z)?;
+        let kind = Kind::transmission(Finish::Specular);
+        Some(LobeSample::delta(i * sign, facet.transmission, 1.0 - facet.choice, facet.eta, kind))
+    }
+
+    /// A direction for the upward `o`, from the density of [`Dielectric::terms`].
+    #[inline]
+    fn draw(&self, o: Vec3, sign: f32, u: Vec3) -> Option<Vec3> {
+        let mut uz = u.z;
+        if let Split::Fresnel { loss, .. } = &self.split {
+            let dense = self.is_dense(sign);
+            let lost = loss.at(o, self.ggx.stretched(o), dense);
+            if uz < lost {
+                let d = loss.sample(u.truncate());
+                return Some(if uz < lost * loss.crossing(dense) { -d } else { d });
+            }
+            uz = ((uz - lost) / (1.0 - lost)).min(ONE_MINUS_EPSILON);
+        }
+        let m = self.ggx.sample_visible(o, u.truncate());
         let c = o.dot(m);
         let facet = self.facet(c, sign);
-        if u.z < facet.choice {
+        if uz < facet.choice {
             let i = (m * (2.0 * c) - o).normalize();
-            if delta {
-                let kind = Kind::reflection(Finish::Specular);
-                return Some(LobeSample::delta(i * sign, facet.reflection, facet.choice, 1.0, kind));
-            }
-            if i.z < MIN_COS {
-                return None;
-            }
-            let (value, pdf) = self.reflected(o, i, m, &facet);
-            LobeSample::continuous(i * sign, value, pdf, 1.0, Kind::reflection(Finish::Glossy))
+            (i.z > 0.0).then_some(i)
         } else {
-            if facet.choice >= 1.0 || facet.cos_t <= 0.0 {
-                return None;
-            }
-            let i = (m * (c / facet.eta - facet.cos_t) - o / facet.eta).normalize();
-            if delta {
-                let kind = Kind::transmission(Finish::Specular);
-                let (value, p) = (facet.transmission, 1.0 - facet.choice);
-                return Some(LobeSample::delta(i * sign, value, p, facet.eta, kind));
-            }
-            if i.z > -MIN_COS {
-                return None;
-            }
-            let (value, pdf) = self.refracted(o, i, m, &facet);
-            LobeSample::continuous(i * sign, value, pdf, facet.eta, Kind::transmission(Finish::Glossy))
+            facet.refract(o, m, c).filter(|i| i.z < 0.0)
         }
     }
 
@@ -132,16 +165,33 @@ impl Dielectric {
         facet.reflection + facet.transmission
     }
 
+    /// Index beyond over index before, seen from above (`side` positive) or below.
+    #[inline]
+    fn relative_index(&self, side: f32) -> f32 {
+        if side > 0.0 { self.eta } else { 1.0 / self.eta }
+    }
+
+    /// Whether the upper side, of directions turned by `sign`, is that of the higher index.
+    #[inline]
+    fn is_dense(&self, sign: f32) -> bool {
+        (sign > 0.0) == (self.eta < 1.0)
+    }
+
     /// What a facet does to light that meets it at cosine `c`, from above (`side` positive) or below.
     #[inline]
     fn facet(&self, c: f32, side: f32) -> Facet {
-        let eta = if side > 0.0 { self.eta } else { 1.0 / self.eta };
+        let eta = self.relative_index(side);
         let (r, cos_t) = dielectric(c, eta);
+        self.facet_with(r, cos_t, eta)
+    }
+
+    /// The same for the exact reflectance `r` and the cosine beyond.
+    #[inline]
+    fn facet_with(&self, r: f32, cos_t: f32, eta: f32) -> Facet {
         match self.split {
-            Split::Fresnel { f0, reflection, transmission } => {
+            Split::Fresnel { f0, reflection, transmission, .. } => {
                 let r0 = f0_from_ior(eta);
-                // index one has no curve to stretch
-                let s = if r0 < 1.0 { ((r - r0) / (1.0 - r0)).clamp(0.0, 1.0) } else { 1.0 };
+                let s = ((r - r0) / (1.0 - r0)).clamp(0.0, 1.0);
                 let f = f0 + (Vec3::ONE - f0) * s;
                 let (reflection, transmission) = (reflection * f, transmission * (Vec3::ONE - f));
                 let (a, b) = (reflection.element_sum(), transmission.element_sum());
@@ -158,42 +208,56 @@ impl Dielectric {
     /// Value and density per projected solid angle; zero for a smooth interface.
     #[inline]
     fn terms(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
-        const NOTHING: (Vec3, f32) = (Vec3::ZERO, 0.0);
         let sign = 1f32.copysign(wo.z);
         let (o, i) = (wo * sign, wi * sign);
         if self.is_delta() || o.z < MIN_COS || i.z.abs() < MIN_COS {
-            return NOTHING;
+            return (Vec3::ZERO, 0.0);
         }
-        if i.z > 0.0 {
-            let m = (o + i).normalize();
-            self.reflected(o, i, m, &self.facet(o.dot(m), sign))
-        } else {
-            let eta = if sign > 0.0 { self.eta } else { 1.0 / self.eta };
-            let h = o + i * eta;
-            // the facet's normal is on the side of the lower index; turn it upwards
-            let m = h.normalize_or_zero() * 1f32.copysign(h.z);
-            if o.dot(m) <= 0.0 || i.dot(m) >= 0.0 {
-                return NOTHING;
-            }
-            self.refracted(o, i, m, &self.facet(o.dot(m), sign))
-        }
+        let (so, si) = (self.ggx.stretched(o), self.ggx.stretched(i));
+        let crosses = i.z < 0.0;
+        let (value, pdf) = match crosses {
+            false => self.reflected((o, so), (i, si), sign),
+            true => self.refracted((o, so), (i, si), sign),
+        };
+        let Split::Fresnel { loss, reflection, transmission, .. } = &self.split else {
+            return (value, pdf);
+        };
+        let (dense_o, dense_i) = (self.is_dense(sign), self.is_dense(sign) != crosses);
+        let (lost_o, lost_i) = (loss.at(o, so, dense_o), loss.at(i, si, dense_i));
+        let crossing = loss.crossing(dense_o);
+        let (share, tint) = if crosses { (crossing, transmission) } else { (1.0 - crossing, reflection) };
+        let found = lost_o * share;
+        let value = value + tint * (found * lost_i * loss.inverse_mean(dense_i) * FRAC_1_PI);
+        (value, pdf * (1.0 - lost_o) + found * loss.pdf(i.z))
     }
 
+    /// Single scattering; each direction with its stretched length.
     #[inline]
-    fn reflected(&self, o: Vec3, i: Vec3, m: Vec3, facet: &Facet) -> (Vec3, f32) {
-        let value = facet.reflection * self.ggx.reflection(o, i, m);
+    fn reflected(&self, (o, so): (Vec3, f32), (i, si): (Vec3, f32), sign: f32) -> (Vec3, f32) {
+        let m = (o + i).normalize();
+        let facet = self.facet(o.dot(m), sign);
+        let value = facet.reflection * self.ggx.reflection(m, (o.z, so), (i.z, si));
         let pdf = facet.choice * self.ggx.visible(o, m) / (4.0 * o.dot(m) * i.z);
         (value, pdf)
     }
 
     /// Walter et al. 2007, eq. 21 and 17, times `n_i^2 / n_o^2` for basic radiance.
     #[inline]
-    fn refracted(&self, o: Vec3, i: Vec3, m: Vec3, facet: &Facet) -> (Vec3, f32) {
-        let (co, ci) = (o.dot(m), i.dot(m).abs());
+    fn refracted(&self, (o, so): (Vec3, f32), (i, si): (Vec3, f32), sign: f32) -> (Vec3, f32) {
+        let eta = self.relative_index(sign);
+        let h = o + i * eta;
+        // the facet's normal is on the side of the lower index; turn it upwards
+        let m = h.normalize_or_zero() * 1f32.copysign(h.z);
+        let (co, ci) = (o.dot(m), -i.dot(m));
+        if co <= 0.0 || ci <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let facet = self.facet_with(reflectance(co, ci, eta), ci, eta);
+        let zi = -i.z;
         // solid angle of the normal over that of the refracted direction
-        let jacobian = ci * (facet.eta / (co - facet.eta * ci)).powi(2);
-        let value = facet.transmission * (self.ggx.refraction(o, i, m) * jacobian);
-        let pdf = (1.0 - facet.choice) * self.ggx.visible(o, m) * jacobian / i.z.abs();
+        let jacobian = ci * (eta / (co - eta * ci)).powi(2);
+        let value = facet.transmission * (self.ggx.reflection(m, (o.z, so), (zi, si)) * 4.0 * co * jacobian);
+        let pdf = (1.0 - facet.choice) * self.ggx.visible(o, m) * jacobian / zi;
         (value, pdf)
     }
 }

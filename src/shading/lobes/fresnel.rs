@@ -21,9 +21,16 @@ pub fn dielectric(cos: f32, eta: f32) -> (f32, f32) {
         return (1.0, 0.0);
     }
     let t = cos2_t.sqrt();
+    (reflectance(c, t, eta), t)
+}
+
+/// The same from both absolute cosines: `c` on the side come from, `t` on the far side. Exact also where
+/// computing `t` from `c` would cancel, near total reflection.
+#[inline]
+pub fn reflectance(c: f32, t: f32, eta: f32) -> f32 {
     let s = (c - eta * t) / (c + eta * t);
     let p = (eta * c - t) / (eta * c + t);
-    (0.5 * (s * s + p * p), t)
+    0.5 * (s * s + p * p)
 }
 
 /// Average over the hemisphere, `2 integral F(mu) mu dmu`, of the dielectric reflectance for

@@ -46,6 +46,18 @@ impl Ggx {
         Vec2::new(self.ax, self.ay)
     }
 
+    /// Perceptual roughness of the isotropic surface of the same mean alpha.
+    #[inline]
+    pub fn mean_roughness(&self) -> f32 {
+        (self.ax * self.ay).sqrt().sqrt()
+    }
+
+    /// The isotropic surface of the same mean alpha.
+    pub fn isotropic(&self) -> Self {
+        let a = (self.ax * self.ay).sqrt();
+        Self::new(a, a)
+    }
+
     /// Density of normals `D(m)` per solid angle; `m` in the upper hemisphere (Heitz 2014, eq. 85).
     #[inline]
     pub fn d(&self, m: Vec3) -> f32 {
@@ -60,19 +72,12 @@ impl Ggx {
         ((self.ax * w.x).powi(2) + (self.ay * w.y).powi(2) + w.z * w.z).sqrt()
     }
 
-    /// `D G2 / (4 |wo_z| |wi_z|)` for a reflection at `m`: the BRDF without its Fresnel term.
+    /// `D G2 / (4 |wo_z| |wi_z|)` for a reflection at `m`: the BRDF without its Fresnel term. For each
+    /// direction its absolute cosine and its [`Ggx::stretched`] length.
     #[inline]
-    pub fn reflection(&self, wo: Vec3, wi: Vec3, m: Vec3) -> f32 {
+    pub fn reflection(&self, m: Vec3, (zo, so): (f32, f32), (zi, si): (f32, f32)) -> f32 {
         // G2 = 2 zo zi / (zi so + zo si) cancels the cosines
-        let (zo, zi) = (wo.z.abs(), wi.z.abs());
-        self.d(m) / (2.0 * (zi * self.stretched(wo) + zo * self.stretched(wi)))
-    }
-
-    /// `D G2 |wo.m| / (|wo_z| |wi_z|)` for a refraction at `m`.
-    #[inline]
-    pub fn refraction(&self, wo: Vec3, wi: Vec3, m: Vec3) -> f32 {
-        let (zo, zi) = (wo.z.abs(), wi.z.abs());
-        2.0 * self.d(m) * wo.dot(m).abs() / (zi * self.stretched(wo) + zo * self.stretched(wi))
+        self.d(m) / (2.0 * (zi * so + zo * si))
     }
 
     /// Density of the normals visible from `w` (`w.z > 0`), per solid angle of `m` (Heitz 2018, eq. 3).

@@ -19,6 +19,7 @@
 
 mod density;
 pub mod dielectric;
+pub mod energy;
 pub mod fresnel;
 pub mod ggx;
 pub mod lambert;

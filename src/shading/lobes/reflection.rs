@@ -1,5 +1,6 @@
 //! Reflection off a GGX microfacet surface with a coloured Fresnel term: metals, glossy paint, coats.
 
+use super::energy::{self, ReflectionScale};
 use super::{Finish, Fresnel, Ggx, Kind, LobeSample, MIN_COS};
 use glam::Vec3;
 
@@ -8,12 +9,19 @@ use glam::Vec3;
 pub struct Reflection {
     ggx: Ggx,
     fresnel: Fresnel,
+    scale: ReflectionScale,
+    /// How much of the light that single scattering loses comes out after more bounces: the factor
+    /// `F_avg E_avg / (1 - F_avg (1 - E_avg))` of Kulla and Conty 2017, with one Fresnel term taken out
+    /// that the lobe already has.
+    regained: Vec3,
 }
 
 impl Reflection {
     /// A surface of microfacets `ggx`, each reflecting by `fresnel`.
     pub fn new(ggx: Ggx, fresnel: Fresnel) -> Self {
-        Self { ggx, fresnel }
+        let (f, e) = (fresnel.average(), energy::mean_albedo(&ggx));
+        let regained = f * e / (Vec3::ONE - f * (1.0 - e));
+        Self { ggx, fresnel, scale: ReflectionScale::new(&ggx), regained }
     }
 
     #[inline]
@@ -56,9 +64,26 @@ impl Reflection {
         LobeSample::continuous(back(i), self.value(o, i, m), pdf, 1.0, Kind::reflection(Finish::Glossy))
     }
 
+    /// Exact, up to the tables' interpolation, for an isotropic dielectric: layers rely on it.
     #[inline]
     pub(super) fn albedo(&self, from: Vec3) -> Vec3 {
-        self.fresnel.eval(from.z.abs())
+        let mu = from.z.abs();
+        if self.is_delta() {
+            return self.fresnel.eval(mu);
+        }
+        let once = energy::albedo(&self.ggx, from);
+        let more = self.regained * (1.0 - once);
+        match self.fresnel {
+            Fresnel::Dielectric { eta, f0 } => {
+                let (f1, f2) = energy::layer_fresnel(&self.ggx, mu, eta);
+                let rise = Vec3::ONE - f0;
+                (f0 + rise * f1) * once + (f0 + rise * f2) * more
+            }
+            Fresnel::Schlick { .. } | Fresnel::F82 { .. } => {
+                let blur = self.ggx.mean_roughness().min(1.0);
+                self.fresnel.eval(mu).lerp(self.fresnel.average(), blur) * (once + more)
+            }
+        }
     }
 
     /// Both directions turned to the upper side, and the normal that mirrors one into the other. `None`
@@ -74,6 +99,9 @@ impl Reflection {
 
     #[inline]
     fn value(&self, o: Vec3, i: Vec3, m: Vec3) -> Vec3 {
-        self.fresnel.eval(o.dot(m)) * self.ggx.reflection(o, i, m)
+        let (so, si) = (self.ggx.stretched(o), self.ggx.stretched(i));
+        let scale = self.scale.product(&self.ggx, (o, so), (i, si));
+        let once = self.fresnel.eval(o.dot(m)) * self.ggx.reflection(m, (o.z, so), (i.z, si));
+        once * (Vec3::ONE + self.regained * (scale - 1.0))
     }
 }
