@@ -218,7 +218,11 @@ impl PathWalk<'_, '_> {
             true => 1.0,
             false => power_heuristic(light.pdf, bsdf.pdf(wo, light.direction).0 * cos),
         };
-        f * light.radiance * (weight / light.pdf) * world.transmittance(hit, &light, &mut self.rays)
+        // the light's radiance is basic radiance once divided by the squared index of its own side
+        let to_radiance = bsdf.relative_index(wo, light.direction).powi(-2);
+        f * light.radiance
+            * (weight * to_radiance / light.pdf)
+            * world.transmittance(hit, &light, &mut self.rays)
     }
 
     fn first_hit(&self, hit: &SurfacePoint, vertex: &Vertex, wo: Vec3) -> FirstHit {

@@ -24,7 +24,7 @@ impl BsdfBuilder {
             lobe: Lobe::Lambert(Lambert),
             delta: false,
         };
-        Self { bsdf: Bsdf { ng, len: 0, entries: [empty; CAPACITY] }, dropped: 0 }
+        Self { bsdf: Bsdf { ng, eta: 1.0, len: 0, entries: [empty; CAPACITY] }, dropped: 0 }
     }
 
     /// Adds a lobe. The normal of `frame` is the shading normal; it is turned to the side of the
@@ -74,7 +74,15 @@ impl BsdfBuilder {
     }
 
     /// The sum of what was pushed.
-    pub fn build(self) -> Bsdf {
+    pub fn build(mut self) -> Bsdf {
+        let (mut most, mut eta) = (0.0, 1.0);
+        for e in self.bsdf.entries() {
+            let weight = e.weight.element_sum();
+            if matches!(e.lobe, Lobe::Dielectric(_)) && !e.delta && weight > most {
+                (most, eta) = (weight, e.lobe.eta());
+            }
+        }
+        self.bsdf.eta = eta;
         self.bsdf
     }
 }

@@ -92,24 +92,15 @@ impl Entry {
         let v = self.frame.to_local(w);
         (v.z * side >= MIN_COS).then_some(v)
     }
-
-    /// Refractive index on the side of `to` over that on the side of `from`, for geometric sides.
-    #[inline]
-    fn relative_index(&self, from: f32, to: f32) -> f32 {
-        if from * to > 0.0 {
-            1.0
-        } else if from > 0.0 {
-            self.lobe.eta()
-        } else {
-            1.0 / self.lobe.eta()
-        }
-    }
 }
 
 /// The scattering of light at one surface point.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf {
     ng: Vec3,
+    /// Refractive index below the surface over that above it, for what continuous lobes transmit: that
+    /// of the refracting lobe of most weight.
+    eta: f32,
     len: usize,
     entries: [Entry; CAPACITY],
 }
@@ -165,6 +156,20 @@ impl Bsdf {
         &self.entries[..self.len]
     }
 
+    /// Refractive index on the side of `to` over that on the side of `from`, for light that a continuous
+    /// lobe scatters between them.
+    #[inline]
+    pub fn relative_index(&self, from: Vec3, to: Vec3) -> f32 {
+        let (from, to) = (self.ng.dot(from), self.ng.dot(to));
+        if from * to > 0.0 {
+            1.0
+        } else if from > 0.0 {
+            self.eta
+        } else {
+            1.0 / self.eta
+        }
+    }
+
     /// The two geometric sides as signs, or `None` for a direction in the tangent plane.
     #[inline]
     fn sides(&self, a: Vec3, b: Vec3) -> Option<(f32, f32, f32)> {
@@ -201,9 +206,9 @@ impl Bsdf {
         let Some((st, sf, cos)) = self.sides(to, from) else { return Vec3::ZERO };
         let mut sum = Vec3::ZERO;
         for e in self.entries() {
-            sum += self.eval_entry(e, to, st, from, sf) * e.relative_index(sf, st).powi(2);
+            sum += self.eval_entry(e, to, st, from, sf);
         }
-        sum / cos
+        sum * (self.relative_index(from, to).powi(2) / cos)
     }
 
     /// Density with which [`Bsdf::sample`], standing on `from`, draws `to` from the continuous lobes.
@@ -249,7 +254,7 @@ impl Bsdf {
         if cos_to * st < MIN_COS {
             return None;
         }
-        let (value, pdf) = if e.delta {
+        let (value, pdf, eta) = if e.delta {
             let value = match walk {
                 Walk::Camera => e.weight * s.value,
                 // the delta's coefficient is symmetric in étendue about ns; this is the change to ng
@@ -258,17 +263,17 @@ impl Bsdf {
                     e.weight * s.value * turn
                 }
             };
-            (value, s.pdf * DiscreteProbability(choice.probability(k)))
+            (value, s.pdf * DiscreteProbability(choice.probability(k)), s.eta)
         } else {
             let value = match walk {
                 Walk::Camera => self.eval(from, direction),
                 Walk::Light => self.eval_flux(from, direction),
             };
             let pdf = self.pdf_with(&choice, from, sf, direction, st, cos_to.abs());
-            (value, Density::Projected(pdf))
+            (value, Density::Projected(pdf), self.relative_index(from, direction))
         };
         let usable = pdf.value() > 0.0 && pdf.value().is_finite() && value.max_element() > 0.0;
-        usable.then_some(BsdfSample { direction, value, pdf, eta: s.eta, kind: s.kind })
+        usable.then_some(BsdfSample { direction, value, pdf, eta, kind: s.kind })
     }
 
     /// Estimate of the directional albedo seen along `wo`: for the Albedo pass, for roulette.

@@ -48,7 +48,7 @@ fn reflected(p: &Principled, wo: Vec3) -> (Vec3, Vec3) {
 }
 
 /// What layering by tabulated or estimated albedos may be off by.
-const ALBEDO_ERROR: f32 = 0.015;
+const ALBEDO_ERROR: f32 = 0.003;
 
 #[test]
 fn never_reflects_more_than_it_receives() {
