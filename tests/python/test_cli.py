@@ -18,6 +18,7 @@ pytest.importorskip("pxr")
 pytest.importorskip("OpenImageIO")
 
 from segue import images
+from segue.cli.curve import Curve
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -137,9 +138,32 @@ def test_the_curve_against_a_reference_falls(stage, tmp_path):
         values = [p[name] for p in curve]
         assert values == sorted(values), name
     assert curve[-1]["mape"] < curve[0]["mape"]
-    assert curve[-1]["seconds"] == pytest.approx(stats["seconds"], rel=0.05)
+    assert curve[-1]["seconds"] == stats["seconds"]
     out, _ = run("compare", tmp_path / "a.exr", tmp_path / "ref.exr", "--json")
     assert json.loads(out)["mape"] == pytest.approx(curve[-1]["mape"], rel=0.02)
+
+
+class PaintedFilm:
+    """Stands for a render whose film holds one value."""
+
+    size = (4, 2)
+    value = 0.0
+
+    def read_pass(self, name):
+        assert name == "Combined"
+        return np.full((2, 4, 4), self.value, np.float32)
+
+
+def test_reports_after_the_end_do_not_lengthen_the_curve():
+    film = PaintedFilm()
+    curve = Curve(film, np.ones((2, 4, 3), np.float32))
+    for seconds, film.value in ((0.1, 0.1), (0.3, 0.5), (1.5, 0.9), (2.0, 0.9)):
+        curve.update({"seconds": seconds, "samples": 10 * seconds})
+    points = curve.finish({"seconds": 1.4, "samples": 14.5})
+    assert [p["samples"] for p in points] == [3.0, 14.5]
+    assert 0.3 <= points[0]["seconds"] < points[1]["seconds"] == 1.4
+    assert points[0]["cpu_seconds"] <= points[1]["cpu_seconds"]
+    np.testing.assert_allclose([p["mape"] for p in points], [0.5, 0.1], rtol=0.02)
 
 
 def test_compare(stage, tmp_path):

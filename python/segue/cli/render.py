@@ -219,7 +219,6 @@ def _render_frame(
     }
     if curve is not None:
         stats["curve"] = curve.finish(stats)
-        stats["seconds"] -= curve.cost
         stats["cpu_seconds"] -= curve.cpu_cost
     else:
         for point in stats.get("curve", []):
