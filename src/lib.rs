@@ -10,6 +10,7 @@ pub mod film;
 
 pub mod accel;
 pub mod shading;
+pub mod transport;
 
 pub mod integrators;
 pub mod session;

@@ -2,10 +2,15 @@
 //! samplers, lobes, lights and the film.
 
 pub mod path;
+pub mod segment;
 
 use crate::film::{Film, Filter, Rect};
 use crate::shading::{Sensor, World};
+use crate::math::Sampler;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// The stop sign of a render: set from any thread, looked at by the workers between small pieces of work.
 #[derive(Debug, Default)]
@@ -29,11 +34,38 @@ impl StopSign {
     }
 }
 
-/// Events that integrators count.
+/// What integrators count.
 #[derive(Debug, Default)]
 pub struct Counters {
     /// Rays traced, shadow rays included.
     pub rays: AtomicU64,
+    /// Seconds spent in each stage, and the bytes that it holds.
+    pub stages: Mutex<BTreeMap<&'static str, (f64, u64)>>,
+}
+
+/// Adds up what the stages of an iteration cost, one after the other.
+pub struct StageCosts<'a> {
+    counters: &'a Counters,
+    since: Instant,
+}
+
+impl<'a> StageCosts<'a> {
+    /// The first stage begins.
+    pub fn new(counters: &'a Counters) -> Self {
+        Self { counters, since: Instant::now() }
+    }
+
+    /// A stage ends, and holds `bytes` of memory; the next begins.
+    pub fn stage(&mut self, name: &'static str, bytes: usize) {
+        let now = Instant::now();
+        let seconds = now.duration_since(self.since).as_secs_f64();
+        self.since = now;
+        // only numbers are behind the lock, whole at any time
+        let mut stages = self.counters.stages.lock().unwrap_or_else(PoisonError::into_inner);
+        let stage = stages.entry(name).or_default();
+        stage.0 += seconds;
+        stage.1 = stage.1.max(bytes as u64);
+    }
 }
 
 /// What an integrator needs to know of a render.
@@ -62,6 +94,15 @@ pub struct Context<'a> {
     pub tile_done: &'a (dyn Fn(Rect) + Sync),
 }
 
+impl Context<'_> {
+    /// Random numbers of sample `index` of a pixel of the full film. Even and odd samples are two independent
+    /// sequences, as the film's two halves must be.
+    pub fn pixel_sampler(&self, x: u32, y: u32, index: u32) -> Sampler {
+        let stream = y.wrapping_mul(1 << 16) ^ x;
+        Sampler::new(self.seed ^ ((index & 1) << 31), stream, index >> 1)
+    }
+}
+
 /// How an iteration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IterationEnd {
@@ -76,4 +117,7 @@ pub trait Integrator: Send {
     /// Adds about one sample a pixel to the film. May return early, with whole samples only, when the
     /// stop sign is raised. `index` counts the calls, for the random numbers.
     fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd;
+
+    /// Whether an iteration that is cut short leaves nothing in the film.
+    fn is_all_or_nothing(&self) -> bool;
 }

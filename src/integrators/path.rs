@@ -5,12 +5,12 @@
 //! 9.2). Paths end by Russian roulette, which leaves the mean as it is, or where nothing is hit.
 
 use super::{Context, Integrator, IterationEnd};
-use crate::film::{FirstHit, Sample, SharedTile};
+use crate::film::{Sample, SharedTile};
 use crate::math::Sampler;
 use crate::shading::bsdf::{Bsdf, Walk};
 use crate::shading::emitters::Receiver;
 use crate::shading::lobes::Density;
-use crate::shading::{CameraRay, LightPoint, Piece, Shaded, SurfacePoint, Vertex, World};
+use crate::shading::{CameraRay, LightPoint, Piece, Shaded, SurfacePoint, World};
 use glam::{Vec2, Vec3};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -36,6 +36,10 @@ impl Integrator for Path {
         });
         if cut_short.into_inner() { IterationEnd::CutShort } else { IterationEnd::Complete }
     }
+
+    fn is_all_or_nothing(&self) -> bool {
+        false
+    }
 }
 
 /// Returns whether all its pixels were sampled.
@@ -48,9 +52,7 @@ fn render_tile(context: &Context, index: u32, shared: &SharedTile) -> bool {
             break;
         }
         let (full_x, full_y) = (x + context.crop.x, y + context.crop.y);
-        let stream = full_y.wrapping_mul(1 << 16) ^ full_x;
-        // even and odd samples are two independent sequences, as the film's two halves must be
-        let sampler = Sampler::new(context.seed ^ ((index & 1) << 31), stream, index >> 1);
+        let sampler = context.pixel_sampler(full_x, full_y, index);
         let mut walk = PathWalk { context, sampler, rays: 0 };
         tile.add(x, y, &walk.sample(Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5)));
         rays += walk.rays;
@@ -158,7 +160,7 @@ impl PathWalk<'_, '_> {
             }
             record(sample, depth, found);
             if from_camera {
-                sample.first_hit = Some(self.first_hit(&hit, &vertex, -piece.direction));
+                sample.first_hit = Some(world.first_hit(context.sensor, &hit, &vertex, -piece.direction));
             }
             if context.max_depth.is_some_and(|d| depth >= d) {
                 return;
@@ -223,19 +225,6 @@ impl PathWalk<'_, '_> {
         f * light.radiance
             * (weight * to_radiance / light.pdf)
             * world.transmittance(hit, &light, &mut self.rays)
-    }
-
-    fn first_hit(&self, hit: &SurfacePoint, vertex: &Vertex, wo: Vec3) -> FirstHit {
-        let world = self.world();
-        FirstHit {
-            depth: self.context.sensor.depth(hit.place.position),
-            position: world.absolute(hit.place.position),
-            normal: vertex.bsdf.normal(),
-            albedo: vertex.bsdf.albedo(wo).clamp(Vec3::ZERO, Vec3::ONE),
-            uv: world.uv(hit),
-            object_index: world.scene().group(hit.instance).object_index,
-            material_index: world.scene().materials[hit.material as usize].pass_index,
-        }
     }
 }
 

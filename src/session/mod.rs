@@ -7,6 +7,7 @@ pub mod statistics;
 
 use crate::film::{Film, FilmError, Rect};
 use crate::integrators::path::Path;
+use crate::integrators::segment::Segment;
 use crate::integrators::{Context, Counters, Integrator, IterationEnd, StopSign};
 use crate::scene::{Scene, SceneError};
 use crate::shading::{BuildCost, Sensor, World, WorldError};
@@ -167,6 +168,7 @@ impl Session {
     pub fn run(&self, events: &mut dyn Events) -> Result<StopReason, SessionError> {
         let mut integrator: Box<dyn Integrator> = match self.settings.method {
             Method::Path => Box::new(Path),
+            Method::Segment => Box::new(Segment::default()),
         };
         locked(&self.state).stop_reason = StopReason::Running;
         let watch = Stopwatch::start();
@@ -322,8 +324,13 @@ impl Session {
     pub fn statistics(&self) -> Statistics {
         let state = locked(&self.state);
         let mut stages = self.build.clone();
-        let sampling = Stage { seconds: state.seconds, bytes: 0 };
-        stages.insert("sampling".into(), sampling);
+        let counted = locked(&self.counters.stages);
+        for (&name, &(seconds, bytes)) in counted.iter() {
+            stages.insert(name.into(), Stage { seconds, bytes });
+        }
+        if counted.is_empty() {
+            stages.insert("sampling".into(), Stage { seconds: state.seconds, bytes: 0 });
+        }
         Statistics {
             integrator: serde_json::to_value(self.settings.method)
                 .ok()

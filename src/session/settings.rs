@@ -10,6 +10,8 @@ pub enum Method {
     /// Unidirectional path tracing with next-event estimation.
     #[default]
     Path,
+    /// Segment-based light transport.
+    Segment,
 }
 
 /// Validated settings of a render.

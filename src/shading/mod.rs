@@ -4,7 +4,10 @@ pub mod bsdf;
 pub mod emitters;
 pub mod lobes;
 
+mod class;
 mod emissive;
+mod first_hit;
+mod light_ray;
 mod material;
 mod ray;
 mod sensor;
@@ -12,6 +15,8 @@ mod surface;
 mod texture;
 mod world;
 
+pub use class::SurfaceClass;
+pub use light_ray::{LightRay, SourceDensity};
 pub use ray::{LightPoint, LightSample, Piece};
 pub use sensor::{CameraRay, Sensor};
 pub use surface::SurfacePoint;

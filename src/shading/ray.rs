@@ -41,6 +41,8 @@ pub struct LightSample {
     /// Whether nothing else could have found this direction.
     pub is_delta: bool,
     pub(super) target: Target,
+    /// The point of the light, as a ray would meet it.
+    pub(super) hit: EmitterHit,
 }
 
 /// Where sampled light comes from.
@@ -52,6 +54,14 @@ pub(super) enum Target {
     Point(Vec3),
     /// A point of a surface that is part of the scene.
     Surface(Place),
+}
+
+impl LightPoint {
+    /// Whether it is infinitely far away.
+    #[inline]
+    pub fn is_infinite(&self) -> bool {
+        self.hit.distance == f32::INFINITY
+    }
 }
 
 impl LightSample {
@@ -70,6 +80,11 @@ impl Piece {
     pub fn from_camera(c: &CameraRay) -> Self {
         let ray = Ray { origin: c.origin, direction: c.direction, t_min: c.range[0], t_max: c.range[1] };
         Self { ray, direction: c.direction, travelled: 0.0 }
+    }
+
+    /// The first piece of a ray that leaves an emitter.
+    pub(super) fn along(ray: Ray, direction: Vec3) -> Self {
+        Self { ray, direction, travelled: 0.0 }
     }
 
     /// The first piece of a ray that leaves a surface.

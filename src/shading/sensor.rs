@@ -67,6 +67,17 @@ impl Sensor {
         -self.rotation.z_axis.dot(p)
     }
 
+    /// Side of the square that a pixel covers at a scene point, as seen from the lens: by distance, so that
+    /// it depends neither on the path that led there nor on the direction of view.
+    pub fn pixel_footprint(&self, p: Vec3) -> f32 {
+        let [x0, x1, y0, y1] = self.camera.window;
+        let pixel = ((x1 - x0) / self.resolution.x * ((y1 - y0) / self.resolution.y)).abs().sqrt();
+        match self.camera.projection {
+            Projection::Perspective => pixel * p.length(),
+            Projection::Orthographic => pixel,
+        }
+    }
+
     /// A uniform point of the aperture's shape, inside the unit circle.
     fn aperture(&self, u: Vec2) -> Vec2 {
         let c = &self.camera;

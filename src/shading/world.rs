@@ -2,6 +2,7 @@
 //! met and lights sampled, surfaces shaded.
 
 use super::bsdf::Bsdf;
+use super::class::SurfaceClass;
 use super::emissive::emissive_triangles;
 use super::emitters::{EmitterHit, Emitters, Incident, MeshTriangle, Receiver, SceneBounds};
 use super::material::Materials;
@@ -9,7 +10,7 @@ use super::ray::{LightPoint, LightSample, Piece, Target};
 use super::surface::{SurfacePoint, place};
 use super::texture::MeshPoint;
 use crate::accel::offset::SurfacePoint as Place;
-use crate::accel::{Accel, AccelError, InstanceGeometry, MeshGeometry};
+use crate::accel::{Accel, AccelError, Hit, InstanceGeometry, MeshGeometry, Ray};
 use crate::scene::{Needs, Scene, SceneError, Warnings};
 use glam::{DVec3, Vec2, Vec2Swizzles, Vec3};
 use std::sync::Arc;
@@ -38,10 +39,11 @@ pub struct BuildCost {
 
 /// A scene, ready to be traced and shaded. Positions are relative to [`Scene::origin`].
 pub struct World {
-    scene: Arc<Scene>,
-    accel: Accel,
-    materials: Materials,
-    emitters: Emitters,
+    pub(super) scene: Arc<Scene>,
+    pub(super) accel: Accel,
+    pub(super) materials: Materials,
+    pub(super) emitters: Emitters,
+    classes: Vec<SurfaceClass>,
     needs: Needs,
     warnings: Warnings,
     costs: Vec<BuildCost>,
@@ -126,7 +128,8 @@ impl World {
         if emitters.is_empty() {
             warnings.add("scene", "nothing emits light: the picture will be black", 1);
         }
-        Ok(Self { scene, accel, materials, emitters, needs, warnings, costs })
+        let classes = scene.materials.iter().map(SurfaceClass::of).collect();
+        Ok(Self { scene, accel, materials, emitters, classes, needs, warnings, costs })
     }
 
     /// The scene's data.
@@ -158,6 +161,39 @@ impl World {
     /// A world position in scene coordinates.
     pub fn relative(&self, p: DVec3) -> Vec3 {
         (p - self.scene.origin).as_vec3()
+    }
+
+    /// How the surfaces of a material may share light with their neighbours.
+    #[inline]
+    pub fn class(&self, material: u32) -> SurfaceClass {
+        self.classes[material as usize]
+    }
+
+    /// The surface at a point of an instance's mesh.
+    pub fn surface(&self, instance: u32, triangle: u32, barycentrics: Vec2) -> SurfacePoint {
+        let hit = Hit { t: 0.0, instance, triangle, u: barycentrics.x, v: barycentrics.y };
+        SurfacePoint::new(&self.scene, &self.accel, &hit)
+    }
+
+    /// The scattering at a surface point that is seen along `wo`.
+    pub fn bsdf(&self, p: &SurfacePoint, wo: Vec3) -> Bsdf {
+        self.materials.bsdf(p, wo)
+    }
+
+    /// Whether nothing at all, transparent or not, lies between two points in space.
+    pub fn is_clear(&self, from: Vec3, to: Vec3) -> bool {
+        !self.accel.occluded(&Ray { t_max: 1.0, ..Ray::new(from, to - from) })
+    }
+
+    /// Calls `found` for the surfaces between two points in space, the first `most` of them.
+    pub fn for_each_surface(&self, from: Vec3, to: Vec3, most: u32, mut found: impl FnMut(&SurfacePoint)) {
+        let mut ray = Ray { t_max: 1.0, ..Ray::new(from, to - from) };
+        for _ in 0..most {
+            let Some(hit) = self.accel.closest(&ray) else { return };
+            let p = SurfacePoint::new(&self.scene, &self.accel, &hit);
+            found(&p);
+            ray = p.place.segment_to_point(to);
+        }
     }
 
     /// Texture coordinates of a surface point.
@@ -263,6 +299,13 @@ impl World {
         let (id, chosen, fresh) = self.emitters.select(receiver, u.x)?;
         let s = self.emitters.sample_towards(id, receiver, Vec2::new(fresh, u.y))?;
         let target = if s.distance.is_finite() { Target::Point(s.point) } else { Target::Infinity };
+        let hit = EmitterHit {
+            emitter: id,
+            distance: s.distance,
+            point: s.point,
+            normal: s.normal,
+            radiance: Vec3::ZERO,
+        };
         Some(match s.incident {
             Incident::Delta { irradiance } => LightSample {
                 direction: s.direction,
@@ -270,6 +313,7 @@ impl World {
                 pdf: chosen.0,
                 is_delta: true,
                 target,
+                hit,
             },
             Incident::Radiance { radiance, pdf } => {
                 let (radiance, target) =
@@ -289,6 +333,7 @@ impl World {
                     pdf: chosen.0 * pdf.0,
                     is_delta: false,
                     target,
+                    hit,
                 }
             }
         })
@@ -302,7 +347,7 @@ impl World {
     }
 
     /// Emission of a triangle, as much of it as there is.
-    fn visible_emission(&self, instance: u32, at: &MeshPoint) -> Vec3 {
+    pub(super) fn visible_emission(&self, instance: u32, at: &MeshPoint) -> Vec3 {
         let material = self.scene.material_index(instance, at.triangle);
         let emission = self.materials.emission(material, at);
         match self.needs.transparency && self.materials.may_be_transparent(material) {

@@ -12,9 +12,11 @@
 
 mod builder;
 pub mod principled;
+mod walk;
 
 pub use builder::{BsdfBuilder, CAPACITY};
 pub use principled::{MetalF90, Principled};
+pub use walk::{Event, Passage};
 
 use super::lobes::{Density, Kind, Lobe, MIN_COS, Side};
 use crate::math::density::{DiscreteProbability, ProjectedPdf};
@@ -202,7 +204,7 @@ impl Bsdf {
 
     /// Effective BSDF for light arriving from `from` and leaving along `to`, times `n_to^2 / n_from^2`:
     /// the value of a light walk.
-    fn eval_flux(&self, from: Vec3, to: Vec3) -> Vec3 {
+    pub fn eval_flux(&self, from: Vec3, to: Vec3) -> Vec3 {
         let Some((st, sf, cos)) = self.sides(to, from) else { return Vec3::ZERO };
         let mut sum = Vec3::ZERO;
         for e in self.entries() {
@@ -235,16 +237,33 @@ impl Bsdf {
     /// Draws a direction, standing on `from`. `u`: three independent uniform numbers of [0,1); x and y
     /// choose the direction, z the lobe. `None`: the light is absorbed.
     pub fn sample(&self, from: Vec3, walk: Walk, u: Vec3) -> Option<BsdfSample> {
-        let cos_from = self.ng.dot(from);
-        if self.len == 0 || cos_from.abs() < MIN_COS {
-            return None;
-        }
-        let sf = 1f32.copysign(cos_from);
+        let sf = self.side_of(from)?;
         let choice = Choice::new(self, from, sf);
         let (k, uz) = choice.pick(u.z);
+        self.sample_entry(&choice, k, from, sf, walk, u.with_z(uz))
+    }
+
+    /// The geometric side of a direction; `None` where nothing scatters or it is in the tangent plane.
+    #[inline]
+    fn side_of(&self, from: Vec3) -> Option<f32> {
+        let cos = self.ng.dot(from);
+        (self.len > 0 && cos.abs() >= MIN_COS).then(|| 1f32.copysign(cos))
+    }
+
+    /// Draws a direction from lobe `k`, which `choice` chose.
+    #[inline]
+    fn sample_entry(
+        &self,
+        choice: &Choice,
+        k: usize,
+        from: Vec3,
+        sf: f32,
+        walk: Walk,
+        u: Vec3,
+    ) -> Option<BsdfSample> {
         let e = &self.entries()[k];
         let local = e.seen_from(from, sf)?;
-        let s = e.lobe.sample(local, u.with_z(uz))?;
+        let s = e.lobe.sample(local, u)?;
         let direction = e.frame.to_world(s.direction).normalize();
         let cos_to = self.ng.dot(direction);
         let st = match s.kind.side {
@@ -259,7 +278,7 @@ impl Bsdf {
                 Walk::Camera => e.weight * s.value,
                 // the delta's coefficient is symmetric in étendue about ns; this is the change to ng
                 Walk::Light => {
-                    let turn = (local.z * cos_to / (cos_from * s.direction.z)).abs();
+                    let turn = (local.z * cos_to / (self.ng.dot(from) * s.direction.z)).abs();
                     e.weight * s.value * turn
                 }
             };
@@ -269,7 +288,7 @@ impl Bsdf {
                 Walk::Camera => self.eval(from, direction),
                 Walk::Light => self.eval_flux(from, direction),
             };
-            let pdf = self.pdf_with(&choice, from, sf, direction, st, cos_to.abs());
+            let pdf = self.pdf_with(choice, from, sf, direction, st, cos_to.abs());
             (value, Density::Projected(pdf), self.relative_index(from, direction))
         };
         let usable = pdf.value() > 0.0 && pdf.value().is_finite() && value.max_element() > 0.0;
@@ -291,8 +310,15 @@ struct Choice {
 }
 
 impl Choice {
+    /// Among all lobes.
     #[inline]
     fn new(bsdf: &Bsdf, from: Vec3, side: f32) -> Self {
+        Self::among(bsdf, from, side, |_| true)
+    }
+
+    /// Among the lobes that are `wanted`, of which there is one at least.
+    #[inline]
+    fn among(bsdf: &Bsdf, from: Vec3, side: f32, wanted: impl Fn(&Entry) -> bool) -> Self {
         let mut cumulative = [0.0; CAPACITY];
         let mut sum = 0.0;
         if bsdf.len == 1 {
@@ -300,6 +326,10 @@ impl Choice {
             return Self { len: 1, cumulative };
         }
         for (c, e) in cumulative.iter_mut().zip(bsdf.entries()) {
+            if !wanted(e) {
+                *c = sum;
+                continue;
+            }
             let albedo = e.seen_from(from, side).map_or(Vec3::ZERO, |o| e.lobe.albedo(o));
             sum += (e.weight * albedo.max(Vec3::splat(MIN_CHOICE))).element_sum();
             *c = sum;

@@ -58,6 +58,11 @@ impl Distant {
         }
     }
 
+    /// Whether all its light comes from one direction.
+    pub fn is_delta(&self) -> bool {
+        self.one_minus_cos <= 0.0
+    }
+
     /// Radiance from the unit vector `direction`; `None` outside the cone.
     pub fn seen(&self, direction: Vec3) -> Option<Vec3> {
         // |a - b|^2 = 2 (1 - cos) for unit vectors, exact where the cosine is not

@@ -13,7 +13,7 @@ use super::sample::{EmitterHit, EmitterId, FromSample, Incident, Receiver, Surfa
 use super::scene_bounds::SceneBounds;
 use super::selection::Infinite;
 use super::sphere::Sphere;
-use crate::math::density::{EtenduePdf, SolidAnglePdf};
+use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
 use crate::math::luminance;
 use crate::scene::light::{Light, LightKind, Shaping};
 use crate::scene::{Image, SceneError};
@@ -130,6 +130,16 @@ impl Emitter {
             Self::Point(_) => EtenduePdf(0.0),
             Self::Distant(l) => l.pdf_from(bounds, direction),
             Self::Dome(l) => l.pdf_from(bounds, direction),
+        }
+    }
+
+    /// Of what no ray can meet: density of the light paths that travel along `direction`, per area of a
+    /// surface that faces them at `distance`.
+    pub fn pdf_of_rays(&self, bounds: &SceneBounds, direction: Vec3, distance: f32) -> AreaPdf {
+        match self {
+            Self::Point(l) => l.pdf_from(direction).to_area(distance, 1.0),
+            Self::Distant(l) if l.is_delta() => AreaPdf(1.0 / bounds.disk_area()),
+            _ => AreaPdf(0.0),
         }
     }
 

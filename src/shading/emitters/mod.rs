@@ -25,7 +25,7 @@ mod tree;
 mod triangle;
 mod triangle_table;
 
-use crate::math::density::{DiscreteProbability, EtenduePdf, SolidAnglePdf};
+use crate::math::density::{AreaPdf, DiscreteProbability, EtenduePdf, SolidAnglePdf};
 use crate::math::distribution::AliasTable;
 use crate::scene::{Image, Light, SceneError, Warnings};
 use emitter::{Emitter, luminance64};
@@ -113,6 +113,11 @@ impl Emitters {
         self.len() == 0
     }
 
+    /// Whether an emitter is infinitely far away.
+    pub fn is_infinite(&self, id: EmitterId) -> bool {
+        matches!(self.get(id), Kind::Light(Emitter::Distant(_) | Emitter::Dome(_)))
+    }
+
     /// Power of all emitters, W; that of domes and distant lights is what enters the scene's sphere.
     pub fn total_power(&self) -> Vec3 {
         self.total_power
@@ -190,6 +195,15 @@ impl Emitters {
         match self.get(hit.emitter) {
             Kind::Light(l) => l.pdf_from(&self.bounds, -direction, hit),
             Kind::Triangle(t) => t.pdf_from(-direction),
+        }
+    }
+
+    /// The same for emitters that no ray can meet, whose light has one direction at every point: density per
+    /// area of a surface that faces rays which travel along `direction`, at `distance` from the emitter.
+    pub fn pdf_of_rays(&self, id: EmitterId, direction: Vec3, distance: f32) -> AreaPdf {
+        match self.get(id) {
+            Kind::Light(l) => l.pdf_of_rays(&self.bounds, direction, distance),
+            Kind::Triangle(_) => AreaPdf(0.0),
         }
     }
 

@@ -41,6 +41,11 @@ impl Point {
         })
     }
 
+    /// Density of [`Point::from`] for a direction of travel.
+    pub fn pdf_from(&self, direction: Vec3) -> SolidAnglePdf {
+        SolidAnglePdf(self.falloff.as_ref().map_or(0.25 / PI, |f| f.pdf(direction)))
+    }
+
     pub fn from(&self, u: Vec2) -> Option<FromSample> {
         let (direction, pdf) = match &self.falloff {
             Some(f) => f.sample(u),

@@ -1,0 +1,184 @@
+//! Segment-based light transport: the whole method, iteration by iteration.
+
+use super::{Context, Integrator, IterationEnd, StageCosts};
+use crate::film::Sample;
+use crate::math::Sampler;
+use crate::math::sampler::hash;
+use crate::transport::Cut;
+use crate::transport::camera::{CameraSampler, Primary};
+use crate::transport::cluster::Clusters;
+use crate::transport::grid::Grid;
+use crate::transport::kernel::Kernel;
+use crate::transport::light::LightSampler;
+use crate::transport::propagate::Reflected;
+use crate::transport::store::{CameraStore, LightStore};
+use crate::transport::weigh::{Sampled, Weights};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Light paths for each camera path.
+const LIGHT_PATHS: f32 = 0.25;
+/// Light paths that one task samples.
+const LIGHT_BATCH: u32 = 1024;
+/// Keeps the random numbers of light paths apart from those of pixels.
+const LIGHT_STREAM: u32 = 0x11e4_7000;
+
+/// Segment-based light transport. Its stores are kept from one iteration to the next.
+#[derive(Debug, Default)]
+pub struct Segment {
+    kernel: Kernel,
+    iterations: u32,
+    camera: CameraStore,
+    light: LightStore,
+    clusters: Clusters,
+    weights: Weights,
+    reflected: Reflected,
+    /// What every pixel sees, row by row.
+    primaries: Vec<Primary>,
+    /// First arrival of every camera path that has one.
+    starts: Vec<u32>,
+}
+
+impl Integrator for Segment {
+    fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd {
+        let stopped = || context.stop.is_raised();
+        let cut = Cut(&stopped);
+        let mut costs = StageCosts::new(context.counters);
+        match self.transport(context, index, &cut, &mut costs) {
+            false => IterationEnd::CutShort,
+            true => {
+                self.gather(context);
+                costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
+                self.iterations += 1;
+                IterationEnd::Complete
+            }
+        }
+    }
+
+    fn is_all_or_nothing(&self) -> bool {
+        true
+    }
+}
+
+impl Segment {
+    /// All stages up to the film. Returns `false` if it was stopped.
+    fn transport(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
+        let Context { world, sensor, .. } = *context;
+        let light_paths = (LIGHT_PATHS * context.crop.area() as f32).ceil();
+        if !self.sample_camera(context, index, light_paths, cut) {
+            return false;
+        }
+        self.sample_light(context, index, light_paths as u32, cut);
+        costs.stage("sampling", self.camera.bytes() + self.light.bytes());
+
+        let grid = Grid::new(sensor, self.kernel.edge(self.iterations), hash(context.seed ^ 0x9e1d, index));
+        let sampled = Sampled {
+            world,
+            camera: &self.camera,
+            light: &self.light,
+            clusters: &Clusters::default(),
+        };
+        if !self.clusters.build(world, &grid, sampled.numbered(), cut) {
+            return false;
+        }
+        costs.stage("clustering", self.clusters.bytes());
+
+        let sampled = Sampled { clusters: &self.clusters, ..sampled };
+        if !self.weights.weigh(sampled, cut) {
+            return false;
+        }
+        costs.stage("weights", self.weights.bytes());
+        let solved = self.reflected.solve(sampled, &self.weights, &self.starts, cut);
+        costs.stage("propagation", self.reflected.bytes());
+        solved
+    }
+
+    fn sample_camera(&mut self, context: &Context, index: u32, light_paths: f32, cut: &Cut) -> bool {
+        let sampler = CameraSampler {
+            world: context.world,
+            sensor: context.sensor,
+            light_paths,
+            transparent_background: context.transparent_background,
+        };
+        let crop = context.crop;
+        let rows: Vec<(CameraStore, Vec<Primary>)> = (0..crop.height)
+            .into_par_iter()
+            .map(|y| {
+                let (mut store, mut primaries, mut rays) = (CameraStore::default(), Vec::new(), 0);
+                for x in 0..crop.width {
+                    if cut.is_raised() {
+                        break;
+                    }
+                    let (full_x, full_y) = (x + crop.x, y + crop.y);
+                    let mut random = context.pixel_sampler(full_x, full_y, index);
+                    let centre = Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5);
+                    let film = centre + context.filter.sample(random.next_2d());
+                    let lens =
+                        if context.world.needs().depth_of_field { random.next_2d() } else { Vec2::ZERO };
+                    let ray = context.sensor.ray(film, lens);
+                    primaries.push(sampler.path(&ray, &mut random, &mut store, &mut rays));
+                }
+                context.counters.rays.fetch_add(rays, Relaxed);
+                (store, primaries)
+            })
+            .collect();
+        if cut.is_raised() {
+            return false;
+        }
+        self.camera.clear();
+        self.primaries.clear();
+        self.starts.clear();
+        for (mut store, primaries) in rows {
+            let first = self.camera.append(&mut store);
+            for mut p in primaries {
+                p.arrival = p.arrival.map(|a| a + first);
+                self.starts.extend(p.arrival);
+                self.primaries.push(p);
+            }
+        }
+        true
+    }
+
+    fn sample_light(&mut self, context: &Context, index: u32, paths: u32, cut: &Cut) {
+        let sampler = LightSampler { world: context.world, paths: paths as f32 };
+        let batches: Vec<LightStore> = (0..paths.div_ceil(LIGHT_BATCH))
+            .into_par_iter()
+            .map(|b| {
+                let (mut store, mut rays) = (LightStore::default(), 0);
+                for k in b * LIGHT_BATCH..paths.min((b + 1) * LIGHT_BATCH) {
+                    if cut.is_raised() {
+                        break;
+                    }
+                    // the paths of one iteration are stratified among each other
+                    let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k);
+                    sampler.path(&mut random, &mut store, &mut rays);
+                }
+                context.counters.rays.fetch_add(rays, Relaxed);
+                store
+            })
+            .collect();
+        self.light.clear();
+        batches.into_iter().for_each(|mut store| self.light.append(&mut store));
+    }
+
+    /// One sample for every pixel.
+    fn gather(&self, context: &Context) {
+        let width = context.crop.width as usize;
+        context.film.add_iteration(|x, y| {
+            let p = &self.primaries[y as usize * width + x as usize];
+            let (reflected, direct) = match p.arrival.map(|a| a as usize) {
+                Some(a) => (self.reflected.carried[a] + self.reflected.photons[a], self.reflected.direct[a]),
+                None => (Vec3::ZERO, Vec3::ZERO),
+            };
+            Sample {
+                radiance: p.emission + p.weight * reflected,
+                alpha: p.alpha,
+                emission: p.emission,
+                direct: p.weight * direct.min(reflected),
+                first_hit: p.first_hit,
+            }
+        });
+        (context.tile_done)(context.film.rect());
+    }
+}

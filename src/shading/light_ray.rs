@@ -1,0 +1,107 @@
+//! The first rays of light paths, and how dense they are beside the other ways to find the same light.
+
+use super::emitters::{Emission, EmitterHit, Receiver};
+use super::ray::{LightPoint, LightSample, Piece};
+use super::surface::{normalize_any, place};
+use super::texture::MeshPoint;
+use super::world::World;
+use crate::accel::Ray;
+use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
+use glam::{Vec2, Vec2Swizzles, Vec3};
+
+/// The first ray of a light path.
+#[derive(Clone, Copy, Debug)]
+pub struct LightRay {
+    /// Where it goes.
+    pub piece: Piece,
+    /// Flux that one path stands for, if there is only one, W.
+    pub flux: Vec3,
+    /// How likely it was, the choice of emitter included.
+    pub density: SourceDensity,
+    /// Where it left the emitter.
+    hit: EmitterHit,
+}
+
+/// Density of a light path's first ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SourceDensity {
+    /// Of an emitter of some extent, per étendue.
+    Extended(EtenduePdf),
+    /// Of a point: per solid angle.
+    Point(SolidAnglePdf),
+    /// Of light of one direction: per area across it.
+    Beam(AreaPdf),
+}
+
+impl World {
+    /// Draws the first ray of a light path, by power. `u`: a uniform number for the emitter, two for the
+    /// place and two for the direction.
+    pub fn sample_emission(&self, u: f32, place_u: Vec2, direction_u: Vec2) -> Option<LightRay> {
+        let (id, chosen, _) = self.emitters.select_emission(u)?;
+        let s = self.emitters.sample_from(id, place_u, direction_u)?;
+        let (mut ray, mut emission, mut point) = (Ray::new(s.origin, s.direction), s.emission, s.origin);
+        if let (Some(b), Some((instance, triangle))) = (s.barycentrics, self.emitters.triangle_of(id)) {
+            let mesh = self.scene.group(instance).mesh;
+            let barycentrics = if self.scene.is_mirrored(instance) { b.yx() } else { b };
+            let at = MeshPoint { mesh, triangle, barycentrics };
+            let origin = place(&self.scene, &self.accel, instance, &at);
+            (ray, point) = (origin.spawn(s.direction), origin.position);
+            if let Emission::Extended { radiance, .. } = &mut emission {
+                *radiance = self.visible_emission(instance, &at);
+            }
+        }
+        let flux = emission.flux() / chosen.0;
+        let density = match emission {
+            Emission::Extended { pdf, .. } => SourceDensity::Extended(pdf * chosen),
+            Emission::Point { pdf, .. } => SourceDensity::Point(pdf * chosen),
+            Emission::Beam { pdf, .. } => SourceDensity::Beam(pdf * chosen),
+        };
+        let hit =
+            EmitterHit { emitter: id, distance: f32::INFINITY, point, normal: s.normal, radiance: Vec3::ZERO };
+        let sound = flux.is_finite() && flux.max_element() > 0.0;
+        sound.then_some(LightRay { piece: Piece::along(ray, s.direction), flux, density, hit })
+    }
+
+    /// Density of the light paths that leave towards where this light was met from.
+    pub fn emission_pdf(&self, light: &LightPoint) -> EtenduePdf {
+        let chosen = self.emitters.emission_probability(light.hit.emitter);
+        self.emitters.pdf_from(light.direction, &light.hit) * chosen
+    }
+
+    /// Density of the light paths that leave a sampled point of a light towards the receiver: per étendue; of
+    /// a delta light, per area across the light's direction.
+    pub fn emission_pdf_of_sample(&self, light: &LightSample) -> f32 {
+        let chosen = self.emitters.emission_probability(light.hit.emitter).0;
+        match light.is_delta {
+            true => {
+                let LightSample { hit, direction, .. } = light;
+                chosen * self.emitters.pdf_of_rays(hit.emitter, -*direction, hit.distance).0
+            }
+            false => chosen * self.emitters.pdf_from(light.direction, &light.hit).0,
+        }
+    }
+
+    /// Density with which [`World::sample_light`] finds the light of an unobstructed light ray at a receiver:
+    /// per solid angle; of a delta light, the probability of choosing it.
+    pub fn pdf_of_sampling_ray(&self, receiver: &Receiver, ray: &LightRay) -> f32 {
+        let chosen = self.emitters.probability(receiver, ray.hit.emitter).0;
+        let to = ray.hit.point - receiver.position;
+        match ray.density {
+            SourceDensity::Point(_) | SourceDensity::Beam(_) => chosen,
+            SourceDensity::Extended(_) if self.emitters.is_infinite(ray.hit.emitter) => {
+                chosen * self.emitters.pdf_towards(receiver, -ray.piece.direction, &ray.hit).0
+            }
+            SourceDensity::Extended(_) => {
+                let hit = EmitterHit { distance: to.length(), ..ray.hit };
+                chosen * self.emitters.pdf_towards(receiver, normalize_any(to), &hit).0
+            }
+        }
+    }
+}
+
+impl LightRay {
+    /// Where the ray left the emitter, relative to the scene's origin.
+    pub fn origin(&self) -> Vec3 {
+        self.hit.point
+    }
+}

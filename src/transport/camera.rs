@@ -1,0 +1,279 @@
+//! Sequential sampling from the camera, with a next-event segment at every arrival (S8).
+
+use super::store::{Arrival, CameraStore, EmissionHit, NextEvent, Outgoing};
+use super::walk::{Chain, End, Follow, Witness};
+use crate::film::FirstHit;
+use crate::math::{Sampler, luminance};
+use crate::shading::bsdf::{Bsdf, Walk};
+use crate::shading::emitters::Receiver;
+use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
+use glam::Vec3;
+
+/// What a pixel sees along its primary segment.
+#[derive(Clone, Copy, Debug)]
+pub struct Primary {
+    /// The arrival at its end.
+    pub arrival: Option<u32>,
+    /// Factor on the basic radiance that is reflected there: throughput over choice probabilities.
+    pub weight: Vec3,
+    /// Radiance of the lights on it.
+    pub emission: Vec3,
+    /// Coverage.
+    pub alpha: f32,
+    /// The first surface on it.
+    pub first_hit: Option<FirstHit>,
+}
+
+impl Primary {
+    const NOTHING: Self =
+        Self { arrival: None, weight: Vec3::ZERO, emission: Vec3::ZERO, alpha: 1.0, first_hit: None };
+}
+
+/// Samples camera paths.
+pub struct CameraSampler<'a> {
+    /// The scene.
+    pub world: &'a World,
+    /// The camera.
+    pub sensor: &'a Sensor,
+    /// Light paths of this iteration: their densities enter those of the camera's segments.
+    pub light_paths: f32,
+    /// Whether what lies behind everything is transparent.
+    pub transparent_background: bool,
+}
+
+/// Bounds of the probability that a path goes on. Below one, so that a closed white scene lets go.
+const SURVIVAL: [f32; 2] = [0.05, 0.98];
+
+/// Probability `q` with which a path goes on from a surface: the albedo of what is continuous, given that the
+/// segment ended there.
+pub fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
+    let albedo = bsdf.continuous_albedo(wo).max_element() / end_probability;
+    // false for NaN
+    if albedo > SURVIVAL[0] { albedo.min(SURVIVAL[1]) } else { SURVIVAL[0] }
+}
+
+/// The end of a segment as it is stored; `goes_on` is the caller's to set.
+pub fn arrival(world: &World, end: &End) -> Arrival {
+    let End { hit, vertex, wo, end_probability } = end;
+    let class = world.class(hit.material);
+    let facing = if hit.place.normal.dot(*wo) < 0.0 { -hit.ns } else { hit.ns };
+    let (reflectance, back_pdf) = match (class, vertex.bsdf.lambert()) {
+        (SurfaceClass::Diffuse, Some((r, _))) => (r, vertex.bsdf.continuous_pdf(*wo, *wo).0),
+        _ => (Vec3::ZERO, 0.0),
+    };
+    Arrival {
+        position: hit.place.position,
+        normal: if class == SurfaceClass::Transmitting { hit.ns } else { facing },
+        wo: *wo,
+        instance: hit.instance,
+        triangle: hit.at.triangle,
+        barycentrics: hit.at.barycentrics,
+        reflectance,
+        back_pdf,
+        survival: survival(&vertex.bsdf, *wo, *end_probability),
+        class,
+        goes_on: false,
+    }
+}
+
+/// Collects what the primary segment sees.
+struct Seeing<'a> {
+    sampler: &'a CameraSampler<'a>,
+    primary: &'a mut Primary,
+}
+
+impl Seeing<'_> {
+    fn add(&mut self, chain: &Chain, radiance: Vec3) {
+        let scale = 1.0 / (chain.forward * chain.index * chain.index);
+        self.primary.emission += chain.throughput * radiance * scale;
+    }
+
+    fn is_background(&self, chain: &Chain) -> bool {
+        self.sampler.transparent_background && chain.passages == 0
+    }
+}
+
+impl Witness for Seeing<'_> {
+    fn light(&mut self, chain: &Chain, light: &LightPoint) {
+        if !(light.is_infinite() && self.is_background(chain)) {
+            self.add(chain, light.radiance);
+        }
+    }
+
+    fn glow(&mut self, chain: &Chain, radiance: Vec3) {
+        self.add(chain, radiance);
+    }
+
+    fn surface(&mut self, hit: &SurfacePoint, vertex: &Vertex, wo: Vec3) {
+        let CameraSampler { world, sensor, .. } = self.sampler;
+        self.primary.first_hit.get_or_insert_with(|| world.first_hit(sensor, hit, vertex, wo));
+    }
+
+    fn escaped(&mut self, chain: &Chain) {
+        if self.is_background(chain) {
+            self.primary.alpha = 1.0 - chain.throughput.element_sum() / 3.0;
+        }
+    }
+}
+
+/// Collects the light that a segment meets after it left an arrival.
+struct Meeting<'a> {
+    world: &'a World,
+    hits: &'a mut Vec<EmissionHit>,
+    arrival: u32,
+    receiver: Receiver,
+    /// Cosine of the direction in which it left.
+    cos: f32,
+    /// `1 / n^2` where it begins.
+    inverse_n2: f32,
+    /// Light paths times the probability that one ends at the arrival.
+    light_paths: f32,
+}
+
+impl Meeting<'_> {
+    fn add(&mut self, chain: &Chain, radiance: Vec3, next_event_pdf: f32, emission_pdf: f32) {
+        let squeeze = 1.0 / (chain.index * chain.index);
+        self.hits.push(EmissionHit {
+            arrival: self.arrival,
+            light: chain.throughput * radiance * (self.inverse_n2 * squeeze),
+            forward: chain.forward,
+            next_event_pdf,
+            light_density: self.light_paths * emission_pdf * chain.reverse * squeeze,
+        });
+    }
+}
+
+impl Witness for Meeting<'_> {
+    fn light(&mut self, chain: &Chain, light: &LightPoint) {
+        let next_event_pdf = match chain.passages {
+            0 => self.world.pdf_of_sampling(&self.receiver, light) / self.cos,
+            _ => 0.0,
+        };
+        let emission_pdf = if self.light_paths > 0.0 { self.world.emission_pdf(light).0 } else { 0.0 };
+        self.add(chain, light.radiance, next_event_pdf, emission_pdf);
+    }
+
+    fn glow(&mut self, chain: &Chain, radiance: Vec3) {
+        self.add(chain, radiance, 0.0, 0.0);
+    }
+}
+
+impl CameraSampler<'_> {
+    /// Samples the path of one camera ray into the store. Adds the rays it takes to `rays`.
+    pub fn path(
+        &self,
+        ray: &CameraRay,
+        sampler: &mut Sampler,
+        store: &mut CameraStore,
+        rays: &mut u64,
+    ) -> Primary {
+        let mut primary = Primary::NOTHING;
+        let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: true };
+        let mut seeing = Seeing { sampler: self, primary: &mut primary };
+        let (chain, end) = follow.segment(Piece::from_camera(ray), sampler, &mut seeing, rays);
+        let Some(mut end) = end else { return primary };
+        primary.arrival = Some(store.arrivals.len() as u32);
+        primary.weight = chain.throughput / chain.forward;
+        let mut inverse_n2 = 1.0 / (chain.index * chain.index);
+        let follow = Follow { from_camera: false, ..follow };
+        loop {
+            let index = store.arrivals.len();
+            let mut arrived = arrival(self.world, &end);
+            let receiver = end.hit.receiver(&end.vertex.bsdf, end.wo);
+            store.next_events.push(self.next_event(&end, &receiver, inverse_n2, sampler, rays));
+            store.inverse_n2.push(inverse_n2);
+            let bsdf = &end.vertex.bsdf;
+            let u = sampler.next_3d();
+            let goes_on = sampler.next_1d() < arrived.survival;
+            let sample = if goes_on { bsdf.sample_continuous(end.wo, Walk::Camera, u) } else { None };
+            arrived.goes_on = sample.is_some();
+            store.arrivals.push(arrived);
+            let Some(sample) = sample else {
+                store.outgoing.push(Outgoing::default());
+                return primary;
+            };
+            let direction = sample.direction;
+            let start_n2 = inverse_n2 / (sample.eta * sample.eta);
+            let light_end = bsdf.end_probability(direction);
+            let mut meeting = Meeting {
+                world: self.world,
+                hits: &mut store.hits,
+                arrival: index as u32,
+                receiver,
+                cos: end.hit.place.normal.dot(direction).abs(),
+                inverse_n2: start_n2,
+                light_paths: self.light_paths * light_end,
+            };
+            let piece = Piece::leaving(&end.hit, direction);
+            let (chain, next) = follow.segment(piece, sampler, &mut meeting, rays);
+            let squeeze = 1.0 / (chain.index * chain.index);
+            store.outgoing.push(Outgoing {
+                direction,
+                pdf: sample.pdf.value(),
+                throughput: chain.throughput,
+                forward: if next.is_some() { chain.forward } else { 0.0 },
+                reverse: chain.reverse * light_end,
+                squeeze,
+            });
+            match next {
+                Some(e) => end = e,
+                None => return primary,
+            }
+            inverse_n2 = start_n2 * squeeze;
+        }
+    }
+
+    /// A next-event segment; its light is zero where none arrives.
+    fn next_event(
+        &self,
+        end: &End,
+        receiver: &Receiver,
+        inverse_n2: f32,
+        sampler: &mut Sampler,
+        rays: &mut u64,
+    ) -> NextEvent {
+        let u = sampler.next_3d();
+        let Some(light) = self.world.sample_light(receiver, u) else { return NextEvent::default() };
+        let bsdf = &end.vertex.bsdf;
+        let cos = end.hit.place.normal.dot(light.direction).abs();
+        let pdf = bsdf.continuous_pdf(end.wo, light.direction).0;
+        if pdf <= 0.0 || cos <= 0.0 {
+            return NextEvent::default();
+        }
+        let visible = self.world.transmittance(&end.hit, &light, rays);
+        if visible == Vec3::ZERO {
+            return NextEvent::default();
+        }
+        let index = bsdf.relative_index(end.wo, light.direction);
+        let arriving = light.radiance * visible * (inverse_n2 / (index * index));
+        let paths = match self.light_paths > 0.0 {
+            true => {
+                let ends = bsdf.end_probability(light.direction);
+                self.light_paths * ends * self.world.emission_pdf_of_sample(&light)
+            }
+            false => 0.0,
+        };
+        let next_event = match light.is_delta {
+            true => NextEvent {
+                direction: light.direction,
+                pdf,
+                light: arriving * cos,
+                next_event_pdf: light.pdf,
+                light_density: paths * cos,
+                is_delta: true,
+            },
+            false => NextEvent {
+                direction: light.direction,
+                pdf,
+                light: arriving,
+                next_event_pdf: light.pdf / cos,
+                light_density: paths,
+                is_delta: false,
+            },
+        };
+        let sound = next_event.light.is_finite()
+            && luminance(next_event.light) > 0.0
+            && next_event.next_event_pdf.is_finite();
+        if sound { next_event } else { NextEvent::default() }
+    }
+}

@@ -1,0 +1,89 @@
+//! Sequential sampling from the lights.
+
+use super::camera::arrival;
+use super::store::{LightStore, Photon, Rivals};
+use super::walk::{Chain, End, Follow, Nobody};
+use crate::math::Sampler;
+use crate::shading::bsdf::Walk;
+use crate::shading::{LightRay, Piece, SourceDensity, SurfaceClass, World};
+use glam::Vec3;
+
+/// Samples light paths.
+pub struct LightSampler<'a> {
+    /// The scene.
+    pub world: &'a World,
+    /// Light paths of this iteration.
+    pub paths: f32,
+}
+
+impl LightSampler<'_> {
+    /// Samples one path into the store. Adds the rays it takes to `rays`.
+    pub fn path(&self, sampler: &mut Sampler, store: &mut LightStore, rays: &mut u64) {
+        let (u, place, direction) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
+        let Some(ray) = self.world.sample_emission(u, place, direction) else { return };
+        let follow = Follow { world: self.world, walk: Walk::Light, from_camera: false };
+        let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
+        let Some(mut end) = end else { return };
+        let mut flux = ray.flux / self.paths * (chain.throughput / chain.forward);
+        let mut rivals = self.first(&ray, &chain, &end);
+        let mut camera_choices = chain.reverse;
+        while flux.is_finite() && flux.max_element() > 0.0 {
+            let mut arrived = arrival(self.world, &end);
+            let u = sampler.next_3d();
+            let goes_on = sampler.next_1d() < arrived.survival;
+            let bsdf = &end.vertex.bsdf;
+            let sample = if goes_on { bsdf.sample_continuous(end.wo, Walk::Light, u) } else { None };
+            arrived.goes_on = sample.is_some();
+            store.arrivals.push(arrived);
+            let (direction, pdf) = sample.map_or((Vec3::ZERO, 0.0), |s| (s.direction, s.pdf.value()));
+            store.photons.push(Photon { flux, rivals, camera_choices, direction, pdf });
+            let Some(sample) = sample else { return };
+            let value = match arrived.class {
+                SurfaceClass::Diffuse => sample.value,
+                // layers depend on the side of the camera, which is known only now
+                _ => self.world.bsdf(&end.hit, direction).eval_flux(end.wo, direction),
+            };
+            flux *= value / (pdf * arrived.survival);
+            let camera_end = bsdf.end_probability(direction);
+            let piece = Piece::leaving(&end.hit, direction);
+            let (chain, next) = follow.segment(piece, sampler, &mut Nobody, rays);
+            let Some(next) = next else { return };
+            flux *= chain.throughput / chain.forward;
+            rivals = Rivals::Later { light_choices: chain.forward, squeeze: chain.index * chain.index };
+            camera_choices = chain.reverse * camera_end;
+            end = next;
+        }
+    }
+
+    /// The rivals of a path's first segment.
+    fn first(&self, ray: &LightRay, chain: &Chain, end: &End) -> Rivals {
+        let direct = chain.passages == 0;
+        let cos = end.hit.place.normal.dot(end.wo).abs();
+        let next_event_pdf = || {
+            let receiver = end.hit.receiver(&end.vertex.bsdf, end.wo);
+            self.world.pdf_of_sampling_ray(&receiver, ray)
+        };
+        let across = match ray.density {
+            SourceDensity::Extended(pdf) => {
+                return Rivals::First {
+                    light_density: self.paths * pdf.0 * chain.forward * chain.index * chain.index,
+                    next_event_pdf: if direct { next_event_pdf() / cos } else { 0.0 },
+                    is_delta: false,
+                };
+            }
+            // through a chain nothing else finds the light of a point: any density will do
+            _ if !direct => {
+                return Rivals::First { light_density: 1.0, next_event_pdf: 0.0, is_delta: true };
+            }
+            SourceDensity::Point(pdf) => {
+                pdf.to_area(end.hit.place.position.distance(ray.origin()), 1.0).0
+            }
+            SourceDensity::Beam(pdf) => pdf.0,
+        };
+        Rivals::First {
+            light_density: self.paths * across * chain.forward * cos,
+            next_event_pdf: next_event_pdf(),
+            is_delta: true,
+        }
+    }
+}
