@@ -14,7 +14,12 @@ from .textures import TextureStore
 from .tree import Stack, is_linked, resolve, socket
 from .values import Constant, ImageValue, Value, average
 
-_DEFAULT_SURFACE = {"type": "diffuse", "color": [0.8, 0.8, 0.8]}
+# What Cycles gives to a surface without a material: since 5.0 what a new material looks like.
+_DEFAULT_SURFACE: dict[str, Any] = (
+    {"type": "principled", "base_color": [0.8, 0.8, 0.8], "roughness": 0.5, "ior": 1.5}
+    if bpy.app.version >= (5, 0, 0)
+    else {"type": "diffuse", "color": [0.8, 0.8, 0.8]}
+)
 
 
 class Translator:

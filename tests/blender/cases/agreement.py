@@ -129,20 +129,25 @@ def case_a_whole_scene() -> None:
     pose = Matrix.Translation((0, -7, 4)) @ Euler((1.05, 0, 0)).to_matrix().to_4x4()
     builders.camera(pose, lens=40.0)
     pictures = agreement.render_both(160, 120, 128, 128)
-    _check(agreement.compare(*pictures), mean=0.02, blocks=0.03, correlation=0.998)
+    _check(agreement.compare(*pictures), mean=0.005, blocks=0.02, correlation=0.999)
 
 
-# Name -> shader node and its inputs. Both engines define these alike.
+# Name -> shader node and its inputs. Both engines define these alike, but for two things that keep
+# some from being rougher or brighter here: what microfacets scatter more than once, Cycles gives
+# back in the shape of single scattering, and to brushed metals as if they were isotropic, so that
+# a white one reflects 94 % where Segue reflects all.
 _MATERIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "diffuse": ("BsdfDiffuse", {"Color": (0.8, 0.2, 0.1, 1)}),
     "rough diffuse": ("BsdfDiffuse", {"Color": (0.8, 0.2, 0.1, 1), "Roughness": 0.8}),
     "glossy": ("BsdfAnisotropic", {"Color": (0.8, 0.6, 0.2, 1), "Roughness": 0.3}),
     "mirror": ("BsdfAnisotropic", {"Color": (0.8, 0.6, 0.2, 1), "Roughness": 0.0}),
+    "rough glossy": ("BsdfAnisotropic", {"Color": (0.8, 0.6, 0.2, 1), "Roughness": 0.6}),
     "brushed": (
         "BsdfAnisotropic",
-        {"Color": (0.8, 0.6, 0.2, 1), "Roughness": 0.3, "Anisotropy": 0.7, "Rotation": 0.1},
+        {"Color": (0.3, 0.2, 0.1, 1), "Roughness": 0.3, "Anisotropy": 0.7, "Rotation": 0.1},
     ),
     "glass": ("BsdfGlass", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.0, "IOR": 1.5}),
+    "rough glass": ("BsdfGlass", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.3, "IOR": 1.5}),
     "frosted": ("BsdfRefraction", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.2, "IOR": 1.3}),
     "transparent": ("BsdfTransparent", {"Color": (0.5, 0.9, 0.8, 1)}),
     "translucent": ("BsdfTranslucent", {"Color": (0.5, 0.9, 0.8, 1)}),
@@ -152,12 +157,14 @@ _MATERIALS: dict[str, tuple[str, dict[str, Any]]] = {
 _PRINCIPLED: dict[str, dict[str, Any]] = {
     "plain": {},
     "metal": {"Metallic": 1.0, "Roughness": 0.3},
+    "rough metal": {"Metallic": 1.0, "Roughness": 0.8},
     "tinted metal": {"Metallic": 1.0, "Roughness": 0.2, "Specular_Tint": (0.2, 0.9, 0.4, 1)},
     "plastic": {"Roughness": 0.1},
     "high index": {"Roughness": 0.2, "IOR": 2.0},
     "no specular": {"Roughness": 0.2, "Specular_IOR_Level": 0.0},
     "tinted specular": {"Roughness": 0.2, "Specular_Tint": (1, 0.3, 0.1, 1)},
     "glass": {"Roughness": 0.0, "Transmission_Weight": 1.0},
+    "rough glass": {"Roughness": 0.2, "Transmission_Weight": 1.0},
     "half glass": {"Roughness": 0.1, "Transmission_Weight": 0.5},
     "coat": {"Roughness": 0.6, "Coat_Weight": 1.0, "Coat_Roughness": 0.05},
     "tinted coat": {"Coat_Weight": 0.8, "Coat_Roughness": 0.3, "Coat_Tint": (0.4, 0.8, 1, 1)},
@@ -165,6 +172,17 @@ _PRINCIPLED: dict[str, dict[str, Any]] = {
     "glowing": {"Emission_Color": (1, 0.5, 0.2, 1), "Emission_Strength": 2.0},
     "alpha": {"Alpha": 0.4},
     "brushed": {"Metallic": 1.0, "Roughness": 0.3, "Anisotropic": 0.8},
+}
+# Samples a pixel, and the limits of mean, blocks and correlation. With other seeds the worst of
+# four comparisons reaches half to two thirds of them; behind glass there is more noise.
+_LIMITS = (256, 0.005, 0.012, 0.9995)
+_GLASS_LIMITS = (512, 0.007, 0.015, 0.999)
+_LIMITS_OF = {
+    "glass": _GLASS_LIMITS,
+    "rough glass": _GLASS_LIMITS,
+    "half glass": _GLASS_LIMITS,
+    "frosted": _GLASS_LIMITS,
+    "brushed": (256, 0.01, 0.015, 0.9995),
 }
 
 
@@ -181,7 +199,12 @@ def _stage(kind: str, inputs: dict[str, Any]) -> None:
     )
     builders.link(floor)
     ball = builders.sphere("Ball", 1.0, 64, 32)
-    ball.materials.append(builders.shader_material(kind, "Tested", **inputs))
+    tested = builders.shader_material(kind, "Tested", **inputs)
+    if kind == "BsdfRefraction":
+        # A new node is of Beckmann's distribution, for which Segue uses GGX.
+        nodes = tested.node_tree.nodes
+        next(n for n in nodes if n.bl_idname == "ShaderNodeBsdfRefraction").distribution = "GGX"
+    ball.materials.append(tested)
     builders.link(ball, matrix=Matrix.Translation((0, 0, 1.05)))
     lamp = Matrix.Translation((2, -2, 4)) @ Euler((-0.5, 0.5, 0)).to_matrix().to_4x4()
     builders.light("AREA", lamp, energy=150.0, size=1.5)
@@ -192,9 +215,11 @@ def _each(materials: dict[str, tuple[str, dict[str, Any]]]) -> None:
     failures = []
     for name, (kind, inputs) in materials.items():
         _stage(kind, inputs)
-        found = agreement.compare(*agreement.render_both(64, 48, 128, 128))
+        samples, mean, blocks, correlation = _LIMITS_OF.get(name, _LIMITS)
+        found = agreement.compare(*agreement.render_both(64, 48, samples, samples))
         print(f"{name}: {found}", flush=True)
-        if np.abs(found.mean).max() > 0.02 or found.blocks > 0.03 or found.correlation < 0.998:
+        within = np.abs(found.mean).max() < mean and found.blocks < blocks
+        if not within or found.correlation < correlation:
             failures.append(f"{name}: {found}")
     assert not failures, "\n".join(failures)
 
@@ -206,6 +231,23 @@ def case_shaders_one_by_one() -> None:
 def case_principled_one_by_one() -> None:
     base = {"Base_Color": (0.6, 0.3, 0.1, 1)}
     _each({name: ("BsdfPrincipled", base | extra) for name, extra in _PRINCIPLED.items()})
+
+
+def case_white_metals_reflect_all_light() -> None:
+    """In a white world, white metal cannot be told from what it mirrors, however it is finished."""
+    for roughness, anisotropy in ((0.3, 0.0), (0.8, 0.0), (0.3, 0.7)):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        _, _, background = builders.world()
+        background.inputs["Color"].default_value = (1, 1, 1, 1)
+        builders.camera(Matrix.Translation((0, 0, 5)), lens=100.0)
+        ball = builders.sphere("Ball", 1.0, 64, 32)
+        inputs = {"Color": (1, 1, 1, 1), "Roughness": roughness, "Anisotropy": anisotropy}
+        ball.materials.append(builders.shader_material("BsdfAnisotropic", **inputs))
+        builders.link(ball, matrix=Euler((1.2, 0.3, 0)).to_matrix().to_4x4())
+        _, picture = agreement.render_both(32, 32, 1, 256)
+        ball_mean = float(picture[10:22, 10:22, :3].mean())
+        print(f"roughness {roughness}, anisotropy {anisotropy}: {ball_mean:.4f}")
+        assert abs(ball_mean - 1.0) < 0.01
 
 
 def case_lights_one_by_one() -> None:
@@ -233,10 +275,10 @@ def case_lights_one_by_one() -> None:
             builders.link(data, matrix=Matrix.Translation((place, 0, place)))
         pose = Matrix.Translation((0, 0, 3)) @ Euler((0.3, 0.2, 0)).to_matrix().to_4x4()
         builders.light(kind, pose, **properties)
-        found = agreement.compare(*agreement.render_both(64, 48, 96, 48))
+        found = agreement.compare(*agreement.render_both(64, 48, 512, 256))
         print(kind, properties)
-        # A narrow spread has a bright middle, in which the same noise weighs more.
-        _check(found, 0.01, blocks=0.03 if "spread" in properties else 0.01, correlation=0.999)
+        # Most of the difference is noise in the bright middle of the narrow spread.
+        _check(found, mean=0.004, blocks=0.01, correlation=0.9998)
 
 
 def case_environment_maps_turn_alike() -> None:
@@ -251,4 +293,4 @@ def case_environment_maps_turn_alike() -> None:
         ball.materials.append(builders.shader_material("BsdfAnisotropic", Roughness=0.0))
         builders.link(ball)
         found = agreement.compare(*agreement.render_both(64, 48, 32, 32))
-        _check(found, mean=0.01, blocks=0.01, correlation=0.999)
+        _check(found, mean=0.004, blocks=0.008, correlation=0.9998)
