@@ -4,30 +4,29 @@ use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::Sample;
 use crate::math::Sampler;
 use crate::math::sampler::hash;
-use crate::transport::Cut;
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::Clusters;
 use crate::transport::grid::Grid;
-use crate::transport::kernel::Kernel;
 use crate::transport::light::LightSampler;
 use crate::transport::propagate::Reflected;
 use crate::transport::store::{CameraStore, LightStore};
 use crate::transport::weigh::{Sampled, Weights};
+use crate::transport::{Cut, Techniques};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Light paths for each camera path.
-const LIGHT_PATHS: f32 = 0.25;
 /// Light paths that one task samples.
 const LIGHT_BATCH: u32 = 1024;
 /// Keeps the random numbers of light paths apart from those of pixels.
 const LIGHT_STREAM: u32 = 0x11e4_7000;
+/// Keeps those of the grids apart from both.
+const GRID_STREAM: u32 = 0x961d_0000;
 
 /// Segment-based light transport. Its stores are kept from one iteration to the next.
 #[derive(Debug, Default)]
 pub struct Segment {
-    kernel: Kernel,
+    techniques: Techniques,
     iterations: u32,
     camera: CameraStore,
     light: LightStore,
@@ -38,6 +37,13 @@ pub struct Segment {
     primaries: Vec<Primary>,
     /// First arrival of every camera path that has one.
     starts: Vec<u32>,
+}
+
+impl Segment {
+    /// With these techniques.
+    pub fn new(techniques: Techniques) -> Self {
+        Self { techniques, ..Self::default() }
+    }
 }
 
 impl Integrator for Segment {
@@ -65,14 +71,15 @@ impl Segment {
     /// All stages up to the film. Returns `false` if it was stopped.
     fn transport(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
         let Context { world, sensor, .. } = *context;
-        let light_paths = (LIGHT_PATHS * context.crop.area() as f32).ceil();
+        let light_paths = (self.techniques.light_paths * context.crop.area() as f32).ceil();
         if !self.sample_camera(context, index, light_paths, cut) {
             return false;
         }
         self.sample_light(context, index, light_paths as u32, cut);
         costs.stage("sampling", self.camera.bytes() + self.light.bytes());
 
-        let grid = Grid::new(sensor, self.kernel.edge(self.iterations), hash(context.seed ^ 0x9e1d, index));
+        let edge = self.techniques.kernel.edge(self.iterations);
+        let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index));
         let sampled = Sampled {
             world,
             camera: &self.camera,
@@ -89,7 +96,14 @@ impl Segment {
             return false;
         }
         costs.stage("weights", self.weights.bytes());
-        let solved = self.reflected.solve(sampled, &self.weights, &self.starts, cut);
+        let solved = match context.max_depth {
+            None => self.reflected.solve(sampled, &self.weights, &self.starts, cut),
+            Some(bounces) => {
+                let first = self.primaries.iter().filter_map(|p| Some((p.arrival?, p.passages)));
+                let first = first.filter(|&(_, passages)| passages < bounces);
+                self.reflected.solve_limited(sampled, &self.weights, first, bounces, cut)
+            }
+        };
         costs.stage("propagation", self.reflected.bytes());
         solved
     }
@@ -100,6 +114,9 @@ impl Segment {
             sensor: context.sensor,
             light_paths,
             transparent_background: context.transparent_background,
+            max_depth: context.max_depth,
+            next_event: self.techniques.next_event,
+            goes_on: self.techniques.camera_paths,
         };
         let crop = context.crop;
         let rows: Vec<(CameraStore, Vec<Primary>)> = (0..crop.height)
@@ -141,7 +158,11 @@ impl Segment {
     }
 
     fn sample_light(&mut self, context: &Context, index: u32, paths: u32, cut: &Cut) {
-        let sampler = LightSampler { world: context.world, paths: paths as f32 };
+        let sampler = LightSampler {
+            world: context.world,
+            paths: paths as f32,
+            next_event: self.techniques.next_event,
+        };
         let batches: Vec<LightStore> = (0..paths.div_ceil(LIGHT_BATCH))
             .into_par_iter()
             .map(|b| {

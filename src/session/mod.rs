@@ -168,7 +168,7 @@ impl Session {
     pub fn run(&self, events: &mut dyn Events) -> Result<StopReason, SessionError> {
         let mut integrator: Box<dyn Integrator> = match self.settings.method {
             Method::Path => Box::new(Path),
-            Method::Segment => Box::new(Segment::default()),
+            Method::Segment => Box::new(Segment::new(self.settings.techniques)),
         };
         locked(&self.state).stop_reason = StopReason::Running;
         let watch = Stopwatch::start();
@@ -177,6 +177,7 @@ impl Session {
             (s.seconds, s.cpu_seconds)
         };
         let announcements = Announcements::new(self.film.rect());
+        let ends_early = !integrator.is_all_or_nothing();
         let (done, finished) = channel();
         let reason = std::thread::scope(|scope| {
             let worker = scope.spawn(|| {
@@ -193,7 +194,7 @@ impl Session {
                 if !self.cancelled.load(Relaxed) && events.progress(&self.progress(before + seconds)) {
                     self.cancel();
                 }
-                if self.settings.limits.seconds.is_some_and(|limit| seconds >= limit) {
+                if ends_early && self.settings.limits.seconds.is_some_and(|limit| seconds >= limit) {
                     self.stop.raise();
                 }
                 // showing pixels costs time: often at first, then ever more rarely
@@ -236,6 +237,7 @@ impl Session {
             tile_done,
         };
         let limits = self.settings.limits;
+        let mut last = 0.0;
         loop {
             let (iterations, index) = {
                 let state = locked(&self.state);
@@ -244,6 +246,13 @@ impl Session {
             if limits.samples.is_some_and(|n| iterations >= n) {
                 self.note(watch, before, cpu_before, true);
                 return StopReason::Samples;
+            }
+            let began = watch.seconds();
+            // an iteration that would be thrown away is not begun, but there is one at least
+            let too_late = |limit: f64| began + 0.5 * last >= limit;
+            if integrator.is_all_or_nothing() && iterations > 0 && limits.seconds.is_some_and(too_late) {
+                self.note(watch, before, cpu_before, true);
+                return StopReason::Time;
             }
             if !self.stop.is_raised() {
                 let end = self.pool.install(|| integrator.iterate(&context, index));
@@ -254,6 +263,7 @@ impl Session {
                     state.iterations = iterations.saturating_add(1);
                 }
             }
+            last = watch.seconds() - began;
             if self.stop.is_raised() {
                 self.note(watch, before, cpu_before, true);
                 return StopReason::Time;

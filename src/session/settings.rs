@@ -1,6 +1,8 @@
 //! What is asked of a render.
 
 use crate::film::{Filter, FilterKind, Pass, PassSet, Rect};
+use crate::transport::Techniques;
+use crate::transport::kernel::{Kernel, Shrinking};
 use serde::{Deserialize, Serialize};
 
 /// The integrators there are.
@@ -14,6 +16,15 @@ pub enum Method {
     Segment,
 }
 
+/// How the kernel of the segment method changes.
+#[derive(Clone, Copy, Debug, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+enum KernelName {
+    Fixed,
+    #[default]
+    Progressive,
+}
+
 /// Validated settings of a render.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -21,6 +32,8 @@ pub struct Settings {
     pub source: String,
     /// How light transport is computed.
     pub method: Method,
+    /// What the segment method samples.
+    pub techniques: Techniques,
     /// Width and height of the full film.
     pub resolution: [u32; 2],
     /// The part of the film that is rendered.
@@ -58,6 +71,12 @@ pub struct Limits {
 #[serde(deny_unknown_fields, default)]
 struct Json {
     integrator: Method,
+    kernel: KernelName,
+    kernel_size: f32,
+    kernel_alpha: f32,
+    light_paths: f32,
+    next_event: bool,
+    camera_paths: bool,
     resolution: [u32; 2],
     crop: Option<[u32; 4]>,
     samples: u32,
@@ -77,6 +96,12 @@ impl Default for Json {
     fn default() -> Self {
         Self {
             integrator: Method::default(),
+            kernel: KernelName::default(),
+            kernel_size: 4.0,
+            kernel_alpha: 0.67,
+            light_paths: 0.25,
+            next_event: true,
+            camera_paths: true,
             resolution: [0, 0],
             crop: None,
             samples: 0,
@@ -91,6 +116,32 @@ impl Default for Json {
             passes: vec!["Combined".into()],
             keep_all: false,
         }
+    }
+}
+
+impl Json {
+    fn techniques(&self) -> Result<Techniques, String> {
+        let within = |what: &str, v: f32, low: f32, high: f32| match v {
+            v if (low..=high).contains(&v) => Ok(v),
+            v => Err(format!("settings: {what} is {v}, not in [{low}, {high}]")),
+        };
+        let alpha = within("kernel_alpha", self.kernel_alpha, 0.01, 0.99)?;
+        let techniques = Techniques {
+            kernel: Kernel {
+                start: within("kernel_size", self.kernel_size, 1e-3, 1e3)?,
+                shrinking: match self.kernel {
+                    KernelName::Fixed => Shrinking::Fixed,
+                    KernelName::Progressive => Shrinking::Progressive { alpha },
+                },
+            },
+            light_paths: within("light_paths", self.light_paths, 0.0, 64.0)?,
+            next_event: self.next_event,
+            camera_paths: self.camera_paths,
+        };
+        if techniques.light_paths == 0.0 && !techniques.next_event && !techniques.camera_paths {
+            return Err("settings: without light_paths, next_event and camera_paths nothing is sampled".into());
+        }
+        Ok(techniques)
     }
 }
 
@@ -136,6 +187,7 @@ impl Settings {
         Ok(Self {
             source: json.into(),
             method: j.integrator,
+            techniques: j.techniques()?,
             resolution: j.resolution,
             crop: Rect::new(x0, y0, x1 - x0, y1 - y0),
             limits,
@@ -168,6 +220,12 @@ mod tests {
             (r#"{"resolution":[4,4],"samples":1,"max_depth":-2}"#, "max_depth"),
             (r#"{"resolution":[4,4],"samples":1,"integrator":"magic"}"#, "magic"),
             (r#"{"resolution":[4,4],"samples":1,"spp":1}"#, "spp"),
+            (r#"{"resolution":[4,4],"samples":1,"kernel_size":0}"#, "kernel_size"),
+            (r#"{"resolution":[4,4],"samples":1,"light_paths":-1}"#, "light_paths"),
+            (
+                r#"{"resolution":[4,4],"samples":1,"light_paths":0,"next_event":false,"camera_paths":false}"#,
+                "nothing is sampled",
+            ),
         ] {
             let e = Settings::from_json(json).unwrap_err();
             assert!(e.contains(what), "{json}: {e}");

@@ -175,6 +175,13 @@ impl World {
         SurfacePoint::new(&self.scene, &self.accel, &hit)
     }
 
+    /// Corners of an instance's triangle, scene space.
+    pub fn triangle(&self, instance: u32, triangle: u32) -> [Vec3; 3] {
+        let mesh = &self.scene.meshes[self.scene.group(instance).mesh as usize];
+        let to_world = &self.scene.instances[instance as usize].to_world;
+        mesh.triangles[triangle as usize].map(|v| to_world.transform_point3(mesh.positions[v as usize]))
+    }
+
     /// The scattering at a surface point that is seen along `wo`.
     pub fn bsdf(&self, p: &SurfacePoint, wo: Vec3) -> Bsdf {
         self.materials.bsdf(p, wo)

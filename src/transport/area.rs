@@ -31,6 +31,30 @@ impl Cell<'_> {
         edge * edge * unit_plane_cut(p, n)
     }
 
+    /// The exact area where the whole cut lies on one triangle and so do all `members`.
+    pub fn on_one_triangle<'m>(
+        &self,
+        world: &World,
+        mut members: impl Iterator<Item = &'m Arrival>,
+    ) -> Option<f32> {
+        let r = self.representative;
+        if self.parted.is_some() || !members.all(|a| (a.instance, a.triangle) == (r.instance, r.triangle)) {
+            return None;
+        }
+        let (low, edge) = self.grid.place(&self.voxel);
+        let [a, b, c] = world.triangle(r.instance, r.triangle).map(|v| (v - low) / edge);
+        let n = (b - a).cross(c - a).normalize_or_zero();
+        if n == Vec3::ZERO {
+            return None;
+        }
+        let inside = |q: Vec3, from: Vec3, to: Vec3| (to - from).cross(q - from).dot(n) >= 0.0;
+        let point = (r.position - low) / edge;
+        plane_cut_corners(point, n)
+            .into_iter()
+            .all(|q| inside(q, a, b) && inside(q, b, c) && inside(q, c, a))
+            .then(|| edge * edge * unit_plane_cut(point, n))
+    }
+
     /// Stratified estimate: rays through the voxel, along the axis nearest to the normal, meet what of the
     /// surface belongs to the cluster. `hidden`: whether a point with its normal is out of the
     /// representative's sight.
@@ -79,34 +103,45 @@ impl Cell<'_> {
 pub fn unit_plane_cut(p: Vec3, n: Vec3) -> f32 {
     let axis = n.abs().max_position();
     let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
-    // the cut is projected along the axis: a square, less what lies above or below the cube
-    let mut polygon: Vec<(f32, f32)> = vec![(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
-    let height = |(u, v): (f32, f32)| {
-        p[axis] - (n[u_axis] * (u - p[u_axis]) + n[v_axis] * (v - p[v_axis])) / n[axis]
+    let corners = plane_cut_corners(p, n);
+    let twice: f32 = (0..corners.len())
+        .map(|k| {
+            let (a, b) = (corners[k], corners[(k + 1) % corners.len()]);
+            a[u_axis] * b[v_axis] - b[u_axis] * a[v_axis]
+        })
+        .sum();
+    // a plane that only touches the cube still has an arrival in it
+    (0.5 * twice.abs() / n[axis].abs()).max(1e-3)
+}
+
+/// Corners of the polygon that the unit cube cuts out of a plane, in order.
+fn plane_cut_corners(p: Vec3, n: Vec3) -> Vec<Vec3> {
+    let axis = n.abs().max_position();
+    let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
+    // along the axis the cut is projected to a square, less what lies above or below the cube
+    let on_plane = |(u, v): (f32, f32)| {
+        let mut q = Vec3::ZERO;
+        (q[u_axis], q[v_axis]) = (u, v);
+        q[axis] = p[axis] - (n[u_axis] * (u - p[u_axis]) + n[v_axis] * (v - p[v_axis])) / n[axis];
+        q
     };
-    for inside in [&(|q| height(q)) as &dyn Fn((f32, f32)) -> f32, &|q| 1.0 - height(q)] {
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (k, &a) in polygon.iter().enumerate() {
-            let b = polygon[(k + 1) % polygon.len()];
+    let mut corners: Vec<Vec3> = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(on_plane).into();
+    for above in [true, false] {
+        let inside = |q: Vec3| if above { q[axis] } else { 1.0 - q[axis] };
+        let mut kept = Vec::with_capacity(corners.len() + 1);
+        for (k, &a) in corners.iter().enumerate() {
+            let b = corners[(k + 1) % corners.len()];
             let (ha, hb) = (inside(a), inside(b));
             if ha >= 0.0 {
                 kept.push(a);
             }
             if (ha >= 0.0) != (hb >= 0.0) {
-                let t = ha / (ha - hb);
-                kept.push((a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1)));
+                kept.push(a.lerp(b, ha / (ha - hb)));
             }
         }
-        polygon = kept;
+        corners = kept;
     }
-    let twice: f32 = (0..polygon.len())
-        .map(|k| {
-            let (a, b) = (polygon[k], polygon[(k + 1) % polygon.len()]);
-            a.0 * b.1 - b.0 * a.1
-        })
-        .sum();
-    // a plane that only touches the cube still has an arrival in it
-    (0.5 * twice.abs() / n[axis].abs()).max(1e-3)
+    corners
 }
 
 #[cfg(test)]

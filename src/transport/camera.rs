@@ -16,6 +16,8 @@ pub struct Primary {
     pub arrival: Option<u32>,
     /// Factor on the basic radiance that is reflected there: throughput over choice probabilities.
     pub weight: Vec3,
+    /// Dirac lobes that it passes.
+    pub passages: u32,
     /// Radiance of the lights on it.
     pub emission: Vec3,
     /// Coverage.
@@ -25,8 +27,14 @@ pub struct Primary {
 }
 
 impl Primary {
-    const NOTHING: Self =
-        Self { arrival: None, weight: Vec3::ZERO, emission: Vec3::ZERO, alpha: 1.0, first_hit: None };
+    const NOTHING: Self = Self {
+        arrival: None,
+        weight: Vec3::ZERO,
+        passages: 0,
+        emission: Vec3::ZERO,
+        alpha: 1.0,
+        first_hit: None,
+    };
 }
 
 /// Samples camera paths.
@@ -39,6 +47,12 @@ pub struct CameraSampler<'a> {
     pub light_paths: f32,
     /// Whether what lies behind everything is transparent.
     pub transparent_background: bool,
+    /// Most bounces of what is seen along a primary segment.
+    pub max_depth: Option<u32>,
+    /// Whether arrivals sample next-event segments.
+    pub next_event: bool,
+    /// Whether paths go on after their first arrival.
+    pub goes_on: bool,
 }
 
 /// Bounds of the probability that a path goes on. Below one, so that a closed white scene lets go.
@@ -84,6 +98,9 @@ struct Seeing<'a> {
 
 impl Seeing<'_> {
     fn add(&mut self, chain: &Chain, radiance: Vec3) {
+        if self.sampler.max_depth.is_some_and(|most| chain.passages > most) {
+            return;
+        }
         let scale = 1.0 / (chain.forward * chain.index * chain.index);
         self.primary.emission += chain.throughput * radiance * scale;
     }
@@ -128,6 +145,7 @@ struct Meeting<'a> {
     inverse_n2: f32,
     /// Light paths times the probability that one ends at the arrival.
     light_paths: f32,
+    next_event: bool,
 }
 
 impl Meeting<'_> {
@@ -139,6 +157,7 @@ impl Meeting<'_> {
             forward: chain.forward,
             next_event_pdf,
             light_density: self.light_paths * emission_pdf * chain.reverse * squeeze,
+            passages: chain.passages,
         });
     }
 }
@@ -146,7 +165,7 @@ impl Meeting<'_> {
 impl Witness for Meeting<'_> {
     fn light(&mut self, chain: &Chain, light: &LightPoint) {
         let next_event_pdf = match chain.passages {
-            0 => self.world.pdf_of_sampling(&self.receiver, light) / self.cos,
+            0 if self.next_event => self.world.pdf_of_sampling(&self.receiver, light) / self.cos,
             _ => 0.0,
         };
         let emission_pdf = if self.light_paths > 0.0 { self.world.emission_pdf(light).0 } else { 0.0 };
@@ -174,13 +193,21 @@ impl CameraSampler<'_> {
         let Some(mut end) = end else { return primary };
         primary.arrival = Some(store.arrivals.len() as u32);
         primary.weight = chain.throughput / chain.forward;
+        primary.passages = chain.passages;
         let mut inverse_n2 = 1.0 / (chain.index * chain.index);
         let follow = Follow { from_camera: false, ..follow };
         loop {
             let index = store.arrivals.len();
             let mut arrived = arrival(self.world, &end);
+            if !self.goes_on {
+                arrived.survival = 0.0;
+            }
             let receiver = end.hit.receiver(&end.vertex.bsdf, end.wo);
-            store.next_events.push(self.next_event(&end, &receiver, inverse_n2, sampler, rays));
+            let next_event = match self.next_event {
+                true => self.next_event(&end, &receiver, inverse_n2, sampler, rays),
+                false => NextEvent::default(),
+            };
+            store.next_events.push(next_event);
             store.inverse_n2.push(inverse_n2);
             let bsdf = &end.vertex.bsdf;
             let u = sampler.next_3d();
@@ -203,6 +230,7 @@ impl CameraSampler<'_> {
                 cos: end.hit.place.normal.dot(direction).abs(),
                 inverse_n2: start_n2,
                 light_paths: self.light_paths * light_end,
+                next_event: self.next_event,
             };
             let piece = Piece::leaving(&end.hit, direction);
             let (chain, next) = follow.segment(piece, sampler, &mut meeting, rays);
@@ -214,6 +242,7 @@ impl CameraSampler<'_> {
                 forward: if next.is_some() { chain.forward } else { 0.0 },
                 reverse: chain.reverse * light_end,
                 squeeze,
+                passages: chain.passages,
             });
             match next {
                 Some(e) => end = e,

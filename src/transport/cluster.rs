@@ -164,7 +164,9 @@ fn drafts(world: &World, grid: &Grid, all: Numbered, group: &[(u64, u32)]) -> Ve
         let point = representative.position + mean / members.len() as f32;
         // where no photon is, the area only shifts light between techniques that agree: a cheap one will do
         let area = match last >= cameras && members.len() > 1 {
-            true => cell.coverage(world, point, &hidden),
+            true => cell
+                .on_one_triangle(world, members.iter().map(|&i| all.get(i)))
+                .unwrap_or_else(|| cell.coverage(world, point, &hidden)),
             false => cell.plane_cut(point),
         };
         divide(members, area, representative.class, cameras, &mut out);

@@ -14,6 +14,8 @@ pub struct LightSampler<'a> {
     pub world: &'a World,
     /// Light paths of this iteration.
     pub paths: f32,
+    /// Whether camera arrivals sample next-event segments.
+    pub next_event: bool,
 }
 
 impl LightSampler<'_> {
@@ -27,6 +29,7 @@ impl LightSampler<'_> {
         let mut flux = ray.flux / self.paths * (chain.throughput / chain.forward);
         let mut rivals = self.first(&ray, &chain, &end);
         let mut camera_choices = chain.reverse;
+        let mut bounces = chain.passages;
         while flux.is_finite() && flux.max_element() > 0.0 {
             let mut arrived = arrival(self.world, &end);
             let u = sampler.next_3d();
@@ -36,7 +39,7 @@ impl LightSampler<'_> {
             arrived.goes_on = sample.is_some();
             store.arrivals.push(arrived);
             let (direction, pdf) = sample.map_or((Vec3::ZERO, 0.0), |s| (s.direction, s.pdf.value()));
-            store.photons.push(Photon { flux, rivals, camera_choices, direction, pdf });
+            store.photons.push(Photon { flux, bounces, rivals, camera_choices, direction, pdf });
             let Some(sample) = sample else { return };
             let value = match arrived.class {
                 SurfaceClass::Diffuse => sample.value,
@@ -51,15 +54,19 @@ impl LightSampler<'_> {
             flux *= chain.throughput / chain.forward;
             rivals = Rivals::Later { light_choices: chain.forward, squeeze: chain.index * chain.index };
             camera_choices = chain.reverse * camera_end;
+            bounces += 1 + chain.passages;
             end = next;
         }
     }
 
     /// The rivals of a path's first segment.
     fn first(&self, ray: &LightRay, chain: &Chain, end: &End) -> Rivals {
-        let direct = chain.passages == 0;
+        let unbroken = chain.passages == 0;
         let cos = end.hit.place.normal.dot(end.wo).abs();
         let next_event_pdf = || {
+            if !self.next_event {
+                return 0.0;
+            }
             let receiver = end.hit.receiver(&end.vertex.bsdf, end.wo);
             self.world.pdf_of_sampling_ray(&receiver, ray)
         };
@@ -67,12 +74,12 @@ impl LightSampler<'_> {
             SourceDensity::Extended(pdf) => {
                 return Rivals::First {
                     light_density: self.paths * pdf.0 * chain.forward * chain.index * chain.index,
-                    next_event_pdf: if direct { next_event_pdf() / cos } else { 0.0 },
+                    next_event_pdf: if unbroken { next_event_pdf() / cos } else { 0.0 },
                     is_delta: false,
                 };
             }
             // through a chain nothing else finds the light of a point: any density will do
-            _ if !direct => {
+            _ if !unbroken => {
                 return Rivals::First { light_density: 1.0, next_event_pdf: 0.0, is_delta: true };
             }
             SourceDensity::Point(pdf) => {

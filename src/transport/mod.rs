@@ -4,6 +4,7 @@
 pub mod area;
 pub mod camera;
 pub mod cluster;
+pub mod depth;
 pub mod grid;
 pub mod kernel;
 pub mod light;
@@ -21,5 +22,24 @@ impl Cut<'_> {
     #[inline]
     pub fn is_raised(&self) -> bool {
         (self.0)()
+    }
+}
+
+/// Which segments are sampled, and how large the kernel is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Techniques {
+    /// The kernel.
+    pub kernel: kernel::Kernel,
+    /// Light paths for each camera path; zero: none.
+    pub light_paths: f32,
+    /// Whether arrivals of camera paths sample next-event segments.
+    pub next_event: bool,
+    /// Whether camera paths go on after their first arrival.
+    pub camera_paths: bool,
+}
+
+impl Default for Techniques {
+    fn default() -> Self {
+        Self { kernel: kernel::Kernel::default(), light_paths: 0.25, next_event: true, camera_paths: true }
     }
 }

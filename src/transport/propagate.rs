@@ -36,19 +36,19 @@ pub struct Reflected {
 
 /// The constants of a camera segment, by the arrival it leaves.
 #[derive(Clone, Copy, Debug, Default)]
-struct Segment {
+pub(super) struct Segment {
     /// Emitted light that it met, weighed: `E / D_E`.
-    emitted: Vec3,
+    pub emitted: Vec3,
     /// Factor on what its end reflects: `T / D_R`.
-    carry: Vec3,
+    pub carry: Vec3,
     /// The same without one photon at the end: `T / D_R^-`.
-    carry_photons: Vec3,
+    pub carry_photons: Vec3,
     /// Own-path continuation: `P_cam / (q p)`.
     continuation: f32,
 }
 
 impl Segment {
-    fn value(&self, carried: Vec3, photons: Vec3) -> Vec3 {
+    pub fn value(&self, carried: Vec3, photons: Vec3) -> Vec3 {
         self.emitted + self.carry * carried + self.carry_photons * photons
     }
 }
@@ -62,8 +62,8 @@ impl Reflected {
     /// stopped.
     pub fn solve(&mut self, s: Sampled, w: &Weights, starts: &[u32], cut: &Cut) -> bool {
         let n = s.camera.arrivals.len();
-        self.segments = segments(s, w);
-        let (photons, first_photons) = gather_photons(s, w);
+        self.segments = segments(s, w, None);
+        let (photons, first_photons) = gather_photons(s, w, None);
         self.photons = photons;
         if cut.is_raised() {
             return false;
@@ -143,8 +143,8 @@ impl Reflected {
     }
 }
 
-/// The constants of all camera segments.
-fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
+/// The constants of all camera segments. `most`: passages through Dirac lobes up to which met light counts.
+pub(super) fn segments(s: Sampled, w: &Weights, most: Option<u32>) -> Vec<Segment> {
     let hits = &s.camera.hits;
     let one = |i: usize| {
         let (a, out) = (&s.camera.arrivals[i], &s.camera.outgoing[i]);
@@ -155,7 +155,8 @@ fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
         let camera = w.densities[s.clusters.place[i] as usize].camera / here.area;
         let mut emitted = Vec3::ZERO;
         let first = hits.partition_point(|h| (h.arrival as usize) < i);
-        for h in hits[first..].iter().take_while(|h| h.arrival as usize == i) {
+        let own = hits[first..].iter().take_while(|h| h.arrival as usize == i);
+        for h in own.filter(|h| most.is_none_or(|m| h.passages <= m)) {
             let next_event = h.next_event_pdf * here.cameras as f32 / here.area;
             emitted += h.light * reciprocal(h.forward * camera + next_event + h.light_density);
         }
@@ -177,27 +178,29 @@ fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
 }
 
 /// Flux over area of a photon, times its weight beside the other techniques.
-fn photon_value(s: Sampled, w: &Weights, c: &Cluster, j: usize) -> (Vec3, bool) {
+fn photon_value(s: Sampled, w: &Weights, c: &Cluster, j: usize) -> Vec3 {
     let photon = &s.light.photons[j];
     let camera = photon.camera_choices * w.densities[s.light_place(j)].camera / c.area;
-    let (own, others, is_first) = match photon.rivals {
+    let (own, others) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
             let met = if is_delta { 0.0 } else { camera };
-            (light_density, met + next_event_pdf * c.cameras as f32 / c.area, true)
+            (light_density, met + next_event_pdf * c.cameras as f32 / c.area)
         }
         Rivals::Later { light_choices, squeeze } => {
             let place = s.light_place(j - 1);
             let cluster = s.clusters.of[s.camera.arrivals.len() + j - 1] as usize;
             let area = s.clusters.clusters[cluster].area;
-            (light_choices * squeeze * w.densities[place].light / area, camera, false)
+            (light_choices * squeeze * w.densities[place].light / area, camera)
         }
     };
-    let weight = if own > 0.0 { own / (own + others) } else { 0.0 };
-    (photon.flux * (weight / c.area), is_first)
+    // with no photon to compare with, the camera has it all; with no camera path either, this one has
+    let weight = if own + others > 0.0 { own / (own + others) } else { 1.0 };
+    photon.flux * (weight / c.area)
 }
 
-/// Reflected light of the photons of every camera arrival's cluster: of all, and of first segments alone.
-fn gather_photons(s: Sampled, w: &Weights) -> (Vec<Vec3>, Vec<Vec3>) {
+/// Reflected light of the photons of every camera arrival's cluster: of all that were scattered at most `most`
+/// times, and of those never scattered alone.
+pub(super) fn gather_photons(s: Sampled, w: &Weights, most: Option<u32>) -> (Vec<Vec3>, Vec<Vec3>) {
     let mut all = vec![Vec3::ZERO; s.camera.arrivals.len()];
     let mut first = all.clone();
     let batches: Vec<Vec<(usize, Vec3, Vec3)>> = clusters(s)
@@ -207,7 +210,10 @@ fn gather_photons(s: Sampled, w: &Weights) -> (Vec<Vec3>, Vec<Vec3>) {
                 if c.lights == 0 || c.cameras == 0 {
                     continue;
                 }
-                let values: Vec<(Vec3, bool)> = s.lights(c).map(|j| photon_value(s, w, c, j)).collect();
+                let counts = |j: usize| most.is_none_or(|m| s.light.photons[j].bounces <= m);
+                let value = |j| if counts(j) { photon_value(s, w, c, j) } else { Vec3::ZERO };
+                let values: Vec<(Vec3, bool)> =
+                    s.lights(c).map(|j| (value(j), s.light.photons[j].bounces == 0)).collect();
                 let sums = |f: &dyn Fn(usize) -> Vec3| {
                     values.iter().enumerate().fold((Vec3::ZERO, Vec3::ZERO), |(all, first), (m, &(v, is_first))| {
                         let light = f(m) * v;
@@ -244,7 +250,7 @@ fn gather_photons(s: Sampled, w: &Weights) -> (Vec<Vec3>, Vec<Vec3>) {
 }
 
 /// One sweep: next-event light and the `values` of the segments that leave a cluster, reflected at its arrivals.
-fn gather(s: Sampled, w: &Weights, values: &[Vec3]) -> Vec<Vec3> {
+pub(super) fn gather(s: Sampled, w: &Weights, values: &[Vec3]) -> Vec<Vec3> {
     let mut out = vec![Vec3::ZERO; values.len()];
     let batches: Vec<Vec<(usize, Vec3)>> = clusters(s)
         .map(|batch| {

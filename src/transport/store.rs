@@ -58,6 +58,8 @@ pub struct Outgoing {
     pub reverse: f32,
     /// `(n_start / n_end)^2`: étendue densities at the far end become densities at the near one.
     pub squeeze: f32,
+    /// Dirac lobes passed.
+    pub passages: u32,
 }
 
 /// The next-event segment of an arrival of a camera path.
@@ -90,6 +92,8 @@ pub struct EmissionHit {
     pub next_event_pdf: f32,
     /// Density with which light paths arrive along the segment, per étendue at its near end.
     pub light_density: f32,
+    /// Dirac lobes passed.
+    pub passages: u32,
 }
 
 /// What an arrival of a light path carries.
@@ -97,6 +101,8 @@ pub struct EmissionHit {
 pub struct Photon {
     /// Flux, W.
     pub flux: Vec3,
+    /// Times that the light has been scattered on its way here.
+    pub bounces: u32,
     /// How else its segment could have been made.
     pub rivals: Rivals,
     /// `c` of the camera's walk along its segment.

@@ -1,0 +1,71 @@
+//! Propagation to a limited number of bounces.
+//!
+//! After `k` sweeps that start from nothing, what an arrival reflects is exactly the light of at most `k` bounces,
+//! its own included, however deep the paths were whose arrivals share its cluster: so the limit is the number of
+//! sweeps, and the paths are sampled without any. Passages through Dirac lobes are bounces too: a segment
+//! with `m` of them reads what its end reflected `m` sweeps before.
+
+use super::Cut;
+use super::propagate::{Reflected, gather, gather_photons, segments};
+use super::weigh::{Sampled, Weights};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Reflected light of at most so many bounces, carried and of photons.
+struct Level {
+    carried: Vec<Vec3>,
+    photons: Vec<Vec3>,
+}
+
+impl Reflected {
+    /// As [`Reflected::solve`], for light of at most `bounces` bounces. `first`: for every path, its first
+    /// arrival and the Dirac lobes before it. Returns `false` if it was stopped.
+    pub fn solve_limited(
+        &mut self,
+        s: Sampled,
+        w: &Weights,
+        first: impl Iterator<Item = (u32, u32)>,
+        bounces: u32,
+        cut: &Cut,
+    ) -> bool {
+        let n = s.camera.arrivals.len();
+        let nothing = || vec![Vec3::ZERO; n];
+        let mut levels = vec![Level { carried: nothing(), photons: nothing() }];
+        self.direct = nothing();
+        for k in 1..=bounces {
+            if cut.is_raised() {
+                return false;
+            }
+            // light met after k passages has bounced once more on its way
+            let constants = segments(s, w, Some(k - 1));
+            let values: Vec<Vec3> = (0..n)
+                .into_par_iter()
+                .with_min_len(1024)
+                .map(|i| {
+                    let out = &s.camera.outgoing[i];
+                    match (k - 1).checked_sub(out.passages) {
+                        Some(level) if out.forward > 0.0 => {
+                            let Level { carried, photons } = &levels[level as usize];
+                            constants[i].value(carried[i + 1], photons[i + 1])
+                        }
+                        _ => constants[i].emitted,
+                    }
+                })
+                .collect();
+            let (photons, first_photons) = gather_photons(s, w, Some(k - 1));
+            levels.push(Level { carried: gather(s, w, &values), photons });
+            if k == 1 {
+                self.direct.clone_from(&levels[1].carried);
+                self.direct.par_iter_mut().zip(first_photons).for_each(|(d, p)| *d += p);
+            }
+        }
+        self.sweeps = bounces;
+        (self.carried, self.photons) = (nothing(), nothing());
+        for (arrival, passages) in first {
+            let i = arrival as usize;
+            let level = &levels[bounces.saturating_sub(passages) as usize];
+            (self.carried[i], self.photons[i]) = (level.carried[i], level.photons[i]);
+        }
+        true
+    }
+}
