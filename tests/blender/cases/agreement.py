@@ -154,6 +154,10 @@ _MATERIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "sheen": ("BsdfSheen", {"Color": (0.5, 0.9, 0.8, 1), "Roughness": 0.4}),
     "emission": ("Emission", {"Color": (0.5, 0.9, 0.8, 1), "Strength": 3.0}),
 }
+if bpy.app.version < (4, 5, 0):
+    # Of a rough diffuse surface Cycles 4.2 leaves out the light that is passed on between facets,
+    # which is a twentieth of a bright one's. A dark one has next to none.
+    _MATERIALS["rough diffuse"] = ("BsdfDiffuse", {"Color": (0.2, 0.15, 0.1, 1), "Roughness": 0.8})
 _PRINCIPLED: dict[str, dict[str, Any]] = {
     "plain": {},
     "metal": {"Metallic": 1.0, "Roughness": 0.3},
