@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up. Each may use those before it, and itself.
-const FLOORS: [&str; 9] = ["math", "scene", "film", "accel", "shading", "transport", "integrators", "session", "bridge"];
+const FLOORS: [&str; 9] =
+    ["math", "scene", "film", "accel", "shading", "transport", "integrators", "session", "bridge"];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {

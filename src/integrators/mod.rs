@@ -5,8 +5,8 @@ pub mod path;
 pub mod segment;
 
 use crate::film::{Film, Filter, Rect};
-use crate::shading::{Sensor, World};
 use crate::math::Sampler;
+use crate::shading::{Sensor, World};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};

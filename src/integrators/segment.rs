@@ -80,13 +80,9 @@ impl Segment {
 
         let edge = self.techniques.kernel.edge(self.iterations);
         let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index));
-        let sampled = Sampled {
-            world,
-            camera: &self.camera,
-            light: &self.light,
-            clusters: &Clusters::default(),
-        };
-        if !self.clusters.build(world, &grid, sampled.numbered(), cut) {
+        let sampled =
+            Sampled { world, camera: &self.camera, light: &self.light, clusters: &Clusters::default() };
+        if !self.clusters.build(world, &grid, sampled.numbered(), light_paths > 0.0, cut) {
             return false;
         }
         costs.stage("clustering", self.clusters.bytes());

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Unidirectional path tracing with next-event estimation.
-    #[default]
-    Path,
     /// Segment-based light transport.
+    #[default]
     Segment,
+    /// Unidirectional path tracing with next-event estimation.
+    Path,
 }
 
 /// How the kernel of the segment method changes.
@@ -139,7 +139,9 @@ impl Json {
             camera_paths: self.camera_paths,
         };
         if techniques.light_paths == 0.0 && !techniques.next_event && !techniques.camera_paths {
-            return Err("settings: without light_paths, next_event and camera_paths nothing is sampled".into());
+            return Err(
+                "settings: without light_paths, next_event and camera_paths nothing is sampled".into()
+            );
         }
         Ok(techniques)
     }
@@ -235,7 +237,7 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_document() {
         let s = Settings::from_json(r#"{"resolution":[40,30],"samples":8}"#).unwrap();
-        assert_eq!((s.method, s.max_depth, s.crop), (Method::Path, None, Rect::new(0, 0, 40, 30)));
+        assert_eq!((s.method, s.max_depth, s.crop), (Method::Segment, None, Rect::new(0, 0, 40, 30)));
         assert_eq!(s.limits, Limits { samples: Some(8), seconds: None, error: None });
     }
 }

@@ -56,8 +56,13 @@ impl World {
             Emission::Point { pdf, .. } => SourceDensity::Point(pdf * chosen),
             Emission::Beam { pdf, .. } => SourceDensity::Beam(pdf * chosen),
         };
-        let hit =
-            EmitterHit { emitter: id, distance: f32::INFINITY, point, normal: s.normal, radiance: Vec3::ZERO };
+        let hit = EmitterHit {
+            emitter: id,
+            distance: f32::INFINITY,
+            point,
+            normal: s.normal,
+            radiance: Vec3::ZERO,
+        };
         let sound = flux.is_finite() && flux.max_element() > 0.0;
         sound.then_some(LightRay { piece: Piece::along(ray, s.direction), flux, density, hit })
     }

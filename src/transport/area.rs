@@ -6,8 +6,10 @@ use crate::math::sampler::{hash, hash_unit};
 use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
 
-/// Coverage points along each of two axes.
-const POINTS: u32 = 4;
+/// Coverage points along each of two axes, where photons are divided by the area.
+pub const MANY_POINTS: u32 = 4;
+/// The same where the area only decides how much each technique counts.
+pub const FEW_POINTS: u32 = 2;
 /// Most surfaces that are looked at below one coverage point.
 const LAYERS: u32 = 8;
 
@@ -56,9 +58,15 @@ impl Cell<'_> {
     }
 
     /// Stratified estimate: rays through the voxel, along the axis nearest to the normal, meet what of the
-    /// surface belongs to the cluster. `hidden`: whether a point with its normal is out of the
+    /// surface belongs to the cluster. `points`: along each of two axes. `hidden`: whether a point with its normal is out of the
     /// representative's sight.
-    pub fn coverage(&self, world: &World, point: Vec3, hidden: &impl Fn(Vec3, Vec3) -> bool) -> f32 {
+    pub fn coverage(
+        &self,
+        world: &World,
+        point: Vec3,
+        points: u32,
+        hidden: &impl Fn(Vec3, Vec3) -> bool,
+    ) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
         let n = self.representative.normal;
         let axis = n.abs().max_position();
@@ -66,12 +74,12 @@ impl Cell<'_> {
         let bin = self.grid.bin(n);
         let seed = hash(point.x.to_bits(), hash(point.y.to_bits(), point.z.to_bits()));
         let mut sum = 0.0;
-        for k in 0..POINTS * POINTS {
-            let u = (k % POINTS) as f32 + hash_unit(seed, 2 * k);
-            let v = (k / POINTS) as f32 + hash_unit(seed, 2 * k + 1);
+        for k in 0..points * points {
+            let u = (k % points) as f32 + hash_unit(seed, 2 * k);
+            let v = (k / points) as f32 + hash_unit(seed, 2 * k + 1);
             let mut top = low;
-            top[u_axis] += u * edge / POINTS as f32;
-            top[v_axis] += v * edge / POINTS as f32;
+            top[u_axis] += u * edge / points as f32;
+            top[v_axis] += v * edge / points as f32;
             let mut bottom = top;
             top[axis] += edge;
             if n[axis] < 0.0 {
@@ -93,7 +101,7 @@ impl Cell<'_> {
                 }
             });
         }
-        let face = edge * edge / (POINTS * POINTS) as f32;
+        let face = edge * edge / (points * points) as f32;
         // the cluster has arrivals, so it is somewhere between the points
         sum.max(0.5) * face
     }

@@ -88,8 +88,9 @@ struct Draft {
 }
 
 impl Clusters {
-    /// Clusters the arrivals. Returns `false` if it was stopped.
-    pub fn build(&mut self, world: &World, grid: &Grid, all: Numbered, cut: &Cut) -> bool {
+    /// Clusters the arrivals. `areas_count`: whether light paths are sampled; without them areas cancel.
+    /// Returns `false` if it was stopped.
+    pub fn build(&mut self, world: &World, grid: &Grid, all: Numbered, areas_count: bool, cut: &Cut) -> bool {
         let n = all.len();
         self.keys.clear();
         self.keys.par_extend((0..n as u32).into_par_iter().map(|i| (grid.key(all.get(i)), i)));
@@ -100,7 +101,10 @@ impl Clusters {
         let drafts: Vec<Draft> = groups
             .par_iter()
             .with_min_len(64)
-            .flat_map_iter(|group| if cut.is_raised() { Vec::new() } else { drafts(world, grid, all, group) })
+            .flat_map_iter(|group| match cut.is_raised() {
+                true => Vec::new(),
+                false => drafts(world, grid, all, group, areas_count),
+            })
             .collect();
         if cut.is_raised() {
             return false;
@@ -141,7 +145,7 @@ impl Clusters {
 
 /// The clusters of what shares a key: one, or two where something stands between its points; each divided
 /// again where pairs would be too many.
-fn drafts(world: &World, grid: &Grid, all: Numbered, group: &[(u64, u32)]) -> Vec<Draft> {
+fn drafts(world: &World, grid: &Grid, all: Numbered, group: &[(u64, u32)], areas_count: bool) -> Vec<Draft> {
     let representative = all.get(group[0].1);
     let voxel = grid.voxel(representative.position);
     let (_, edge) = grid.place(&voxel);
@@ -162,12 +166,14 @@ fn drafts(world: &World, grid: &Grid, all: Numbered, group: &[(u64, u32)]) -> Ve
         let cell = area::Cell { grid, voxel, representative, parted: parted.then_some(is_far) };
         let mean = members.iter().map(|&i| all.get(i).position - representative.position).sum::<Vec3>();
         let point = representative.position + mean / members.len() as f32;
-        // where no photon is, the area only shifts light between techniques that agree: a cheap one will do
-        let area = match last >= cameras && members.len() > 1 {
+        let has_photons = last >= cameras && members.len() > 1;
+        let points = if has_photons { area::MANY_POINTS } else { area::FEW_POINTS };
+        let area = match areas_count {
+            // it cancels
+            false => cell.plane_cut(point),
             true => cell
                 .on_one_triangle(world, members.iter().map(|&i| all.get(i)))
-                .unwrap_or_else(|| cell.coverage(world, point, &hidden)),
-            false => cell.plane_cut(point),
+                .unwrap_or_else(|| cell.coverage(world, point, points, &hidden)),
         };
         divide(members, area, representative.class, cameras, &mut out);
     }

@@ -11,7 +11,7 @@ use glam::{IVec3, Mat3, Quat, Vec2, Vec3};
 use std::f32::consts::TAU;
 
 /// Bins of normals along each axis of their octahedral map.
-const NORMAL_BINS: f32 = 8.0;
+const NORMAL_BINS: f32 = 4.0;
 /// Largest exponent of an edge, either way: what a footprint of zero or infinity gets.
 const MAX_LEVEL: i32 = 100;
 
@@ -166,7 +166,7 @@ mod tests {
             let grid = Grid::new(&sensor, 4.0, seed);
             for p in points(100) {
                 let n = p.normalize();
-                assert!(grid.bin(n) < 64);
+                assert!(grid.bin(n) < 16);
                 assert_ne!(grid.bin(n), grid.bin(-n));
             }
         }

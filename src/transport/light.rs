@@ -82,9 +82,7 @@ impl LightSampler<'_> {
             _ if !unbroken => {
                 return Rivals::First { light_density: 1.0, next_event_pdf: 0.0, is_delta: true };
             }
-            SourceDensity::Point(pdf) => {
-                pdf.to_area(end.hit.place.position.distance(ray.origin()), 1.0).0
-            }
+            SourceDensity::Point(pdf) => pdf.to_area(end.hit.place.position.distance(ray.origin()), 1.0).0,
             SourceDensity::Beam(pdf) => pdf.0,
         };
         Rivals::First {

@@ -165,7 +165,8 @@ pub(super) fn segments(s: Sampled, w: &Weights, most: Option<u32>) -> Vec<Segmen
             return Segment { emitted, continuation, ..Segment::default() };
         }
         let end = &s.clusters.clusters[s.clusters.of[i + 1] as usize];
-        let light = w.densities[s.clusters.place[i + 1] as usize].light / end.area * out.reverse * out.squeeze;
+        let light =
+            w.densities[s.clusters.place[i + 1] as usize].light / end.area * out.reverse * out.squeeze;
         let others = if end.lights > 0 { 1.0 - 1.0 / end.lights as f32 } else { 0.0 };
         Segment {
             emitted,
@@ -215,10 +216,13 @@ pub(super) fn gather_photons(s: Sampled, w: &Weights, most: Option<u32>) -> (Vec
                 let values: Vec<(Vec3, bool)> =
                     s.lights(c).map(|j| (value(j), s.light.photons[j].bounces == 0)).collect();
                 let sums = |f: &dyn Fn(usize) -> Vec3| {
-                    values.iter().enumerate().fold((Vec3::ZERO, Vec3::ZERO), |(all, first), (m, &(v, is_first))| {
-                        let light = f(m) * v;
-                        (all + light, if is_first { first + light } else { first })
-                    })
+                    values.iter().enumerate().fold(
+                        (Vec3::ZERO, Vec3::ZERO),
+                        |(all, first), (m, &(v, is_first))| {
+                            let light = f(m) * v;
+                            (all + light, if is_first { first + light } else { first })
+                        },
+                    )
                 };
                 let arrivals = &s.light.arrivals;
                 let lights = s.clusters.order[c.light_places()].iter();
@@ -288,5 +292,7 @@ fn clusters<'a>(
     s: Sampled<'a>,
 ) -> impl IndexedParallelIterator<Item = impl Iterator<Item = (usize, &'a Cluster)>> {
     let all = &s.clusters.clusters;
-    all.par_chunks(BATCH).enumerate().map(|(b, chunk)| chunk.iter().enumerate().map(move |(k, c)| (b * BATCH + k, c)))
+    all.par_chunks(BATCH)
+        .enumerate()
+        .map(|(b, chunk)| chunk.iter().enumerate().map(move |(k, c)| (b * BATCH + k, c)))
 }

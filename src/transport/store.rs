@@ -5,8 +5,8 @@
 //! point away from the surface; densities are per projected solid angle about the geometric normal; radiance
 //! is basic radiance `L / n^2`, with the camera in a medium of index one.
 
-use crate::shading::{SurfaceClass, World};
 use crate::shading::bsdf::Bsdf;
+use crate::shading::{SurfaceClass, World};
 use glam::{Vec2, Vec3};
 
 /// The end of a segment, from the camera or from a light.

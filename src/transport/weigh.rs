@@ -5,9 +5,9 @@
 //! arrivals of a cluster, so one sum of `q` serves all. Others are evaluated pair by pair, and the values of the
 //! lobes are kept for the gathering.
 
+use super::Cut;
 use super::cluster::{Cluster, Clusters, Numbered};
 use super::store::{CameraStore, LightStore, NextEvent};
-use super::Cut;
 use crate::shading::bsdf::Bsdf;
 use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
@@ -125,7 +125,11 @@ impl Weights {
         for (b, batch) in (0..).zip(batches) {
             self.densities.extend(batch.densities);
             self.direct.extend(batch.direct);
-            self.matrices.extend(batch.starts.iter().map(|&(start, columns)| Matrix { batch: b, start, columns }));
+            self.matrices.extend(batch.starts.iter().map(|&(start, columns)| Matrix {
+                batch: b,
+                start,
+                columns,
+            }));
             self.values.push(batch.values);
         }
         true
@@ -187,8 +191,7 @@ fn diffuse(s: Sampled, c: &Cluster, batch: &mut Batch) {
 }
 
 fn paired(s: Sampled, c: &Cluster, batch: &mut Batch) {
-    let cameras: Vec<(usize, Bsdf)> =
-        s.cameras(c).map(|i| (i, s.camera.arrivals[i].bsdf(s.world))).collect();
+    let cameras: Vec<(usize, Bsdf)> = s.cameras(c).map(|i| (i, s.camera.arrivals[i].bsdf(s.world))).collect();
     let lights: Vec<(usize, Bsdf)> = s.lights(c).map(|j| (j, s.light.arrivals[j].bsdf(s.world))).collect();
     let (n, m) = (cameras.len(), lights.len());
     let first = batch.densities.len();

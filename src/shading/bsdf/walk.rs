@@ -92,9 +92,7 @@ impl Bsdf {
     pub fn continuous_albedo(&self, from: Vec3) -> Vec3 {
         let side = 1f32.copysign(self.ng.dot(from));
         let continuous = self.entries().iter().filter(|e| !e.delta);
-        continuous
-            .filter_map(|e| e.seen_from(from, side).map(|o| e.weight * e.lobe.albedo(o)))
-            .sum()
+        continuous.filter_map(|e| e.seen_from(from, side).map(|o| e.weight * e.lobe.albedo(o))).sum()
     }
 
     /// Where all continuous lobes are Lambert's, about one normal: their reflectance and that normal.
