@@ -12,8 +12,16 @@ class SegueSceneSettings(bpy.types.PropertyGroup):
     integrator: EnumProperty(
         name="Integrator",
         description="Method of light transport",
-        items=[("path", "Path Tracing", "Unidirectional path tracing with next-event estimation")],
-        default="path",
+        items=[
+            (
+                "segment",
+                "Segments",
+                "Segments from the camera and from the lights, gathered in small clusters: finds caustics and "
+                "light behind glass",
+            ),
+            ("path", "Path Tracing", "Unidirectional path tracing with next-event estimation"),
+        ],
+        default="segment",
     )
     samples: IntProperty(
         name="Samples",

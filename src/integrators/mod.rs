@@ -86,6 +86,8 @@ pub struct Context<'a> {
     pub seed: u32,
     /// Whether what lies behind everything is transparent.
     pub transparent_background: bool,
+    /// Iterations that were completed before.
+    pub completed: u32,
     /// Looked at at least every few milliseconds.
     pub stop: &'a StopSign,
     /// Event counts.

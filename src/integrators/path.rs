@@ -135,7 +135,7 @@ impl PathWalk<'_, '_> {
                         throughput.weight *= weight;
                         piece = piece.beyond(&hit);
                     }
-                    Shaded::Scatters { weight, vertex } => {
+                    Shaded::Scatters { weight, vertex, .. } => {
                         throughput.weight *= weight;
                         break Some((hit, vertex));
                     }

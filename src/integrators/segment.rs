@@ -5,7 +5,7 @@ use crate::film::Sample;
 use crate::math::Sampler;
 use crate::math::sampler::hash;
 use crate::transport::camera::{CameraSampler, Primary};
-use crate::transport::cluster::Clusters;
+use crate::transport::cluster::{Clusters, Numbered};
 use crate::transport::grid::Grid;
 use crate::transport::light::LightSampler;
 use crate::transport::propagate::Reflected;
@@ -27,7 +27,6 @@ const GRID_STREAM: u32 = 0x961d_0000;
 #[derive(Debug, Default)]
 pub struct Segment {
     techniques: Techniques,
-    iterations: u32,
     camera: CameraStore,
     light: LightStore,
     clusters: Clusters,
@@ -56,7 +55,6 @@ impl Integrator for Segment {
             true => {
                 self.gather(context);
                 costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-                self.iterations += 1;
                 IterationEnd::Complete
             }
         }
@@ -78,16 +76,15 @@ impl Segment {
         self.sample_light(context, index, light_paths as u32, cut);
         costs.stage("sampling", self.camera.bytes() + self.light.bytes());
 
-        let edge = self.techniques.kernel.edge(self.iterations);
+        let edge = self.techniques.kernel.edge(context.completed);
         let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index));
-        let sampled =
-            Sampled { world, camera: &self.camera, light: &self.light, clusters: &Clusters::default() };
-        if !self.clusters.build(world, &grid, sampled.numbered(), light_paths > 0.0, cut) {
+        let all = Numbered { camera: &self.camera.arrivals, light: &self.light.arrivals };
+        if !self.clusters.build(world, &grid, all, light_paths > 0.0, cut) {
             return false;
         }
         costs.stage("clustering", self.clusters.bytes());
 
-        let sampled = Sampled { clusters: &self.clusters, ..sampled };
+        let sampled = Sampled { world, camera: &self.camera, light: &self.light, clusters: &self.clusters };
         if !self.weights.weigh(sampled, cut) {
             return false;
         }
@@ -96,8 +93,8 @@ impl Segment {
             None => self.reflected.solve(sampled, &self.weights, &self.starts, cut),
             Some(bounces) => {
                 let first = self.primaries.iter().filter_map(|p| Some((p.arrival?, p.passages)));
-                let first = first.filter(|&(_, passages)| passages < bounces);
-                self.reflected.solve_limited(sampled, &self.weights, first, bounces, cut)
+                let first: Vec<_> = first.filter(|&(_, passages)| passages < bounces).collect();
+                self.reflected.solve_limited(sampled, &self.weights, &first, bounces, cut)
             }
         };
         costs.stage("propagation", self.reflected.bytes());
@@ -185,14 +182,17 @@ impl Segment {
         context.film.add_iteration(|x, y| {
             let p = &self.primaries[y as usize * width + x as usize];
             let (reflected, direct) = match p.arrival.map(|a| a as usize) {
-                Some(a) => (self.reflected.carried[a] + self.reflected.photons[a], self.reflected.direct[a]),
+                Some(a) => {
+                    let direct = if p.passages == 0 { self.reflected.direct[a] } else { Vec3::ZERO };
+                    (self.reflected.carried[a] + self.reflected.photons[a], direct)
+                }
                 None => (Vec3::ZERO, Vec3::ZERO),
             };
             Sample {
-                radiance: p.emission + p.weight * reflected,
+                radiance: p.light + p.weight * reflected,
                 alpha: p.alpha,
                 emission: p.emission,
-                direct: p.weight * direct.min(reflected),
+                direct: p.mirrored + p.weight * direct.min(reflected),
                 first_hit: p.first_hit,
             }
         });

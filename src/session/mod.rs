@@ -223,7 +223,8 @@ impl Session {
         watch: &Stopwatch,
         (before, cpu_before): (f64, f64),
     ) -> StopReason {
-        let context = Context {
+        let context = |completed: u32| Context {
+            completed,
             world: &self.world,
             sensor: &self.sensor,
             film: &self.film,
@@ -255,7 +256,7 @@ impl Session {
                 return StopReason::Time;
             }
             if !self.stop.is_raised() {
-                let end = self.pool.install(|| integrator.iterate(&context, index));
+                let end = self.pool.install(|| integrator.iterate(&context(iterations), index));
                 let mut state = locked(&self.state);
                 // one that was cut short is begun too: its samples must not be drawn again
                 state.begun = index.saturating_add(1);

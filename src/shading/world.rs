@@ -8,7 +8,7 @@ use super::emitters::{EmitterHit, Emitters, Incident, MeshTriangle, Receiver, Sc
 use super::material::Materials;
 use super::ray::{LightPoint, LightSample, Piece, Target};
 use super::surface::{SurfacePoint, place};
-use super::texture::MeshPoint;
+use super::texture::{MeshPoint, interpolate};
 use crate::accel::offset::SurfacePoint as Place;
 use crate::accel::{Accel, AccelError, Hit, InstanceGeometry, MeshGeometry, Ray};
 use crate::scene::{Needs, Scene, SceneError, Warnings};
@@ -71,6 +71,8 @@ pub enum Shaded {
     Scatters {
         /// Factor on its throughput.
         weight: Vec3,
+        /// Share of the surface that is there, which is in `weight`.
+        opacity: f32,
         /// The surface.
         vertex: Vertex,
     },
@@ -175,11 +177,25 @@ impl World {
         SurfacePoint::new(&self.scene, &self.accel, &hit)
     }
 
-    /// Corners of an instance's triangle, scene space.
-    pub fn triangle(&self, instance: u32, triangle: u32) -> [Vec3; 3] {
-        let mesh = &self.scene.meshes[self.scene.group(instance).mesh as usize];
+    /// Corners of an instance's triangle, scene space, if it has one shading normal.
+    pub fn flat_triangle(&self, instance: u32, triangle: u32) -> Option<[Vec3; 3]> {
+        let index = self.scene.group(instance).mesh;
+        let mesh = &self.scene.meshes[index as usize];
+        if let Some(normals) = &mesh.normals {
+            let normal = |u: f32, v: f32| {
+                interpolate(
+                    normals,
+                    mesh,
+                    &MeshPoint { mesh: index, triangle, barycentrics: Vec2::new(u, v) },
+                )
+            };
+            if normal(0.0, 0.0) != normal(1.0, 0.0) || normal(0.0, 0.0) != normal(0.0, 1.0) {
+                return None;
+            }
+        }
         let to_world = &self.scene.instances[instance as usize].to_world;
-        mesh.triangles[triangle as usize].map(|v| to_world.transform_point3(mesh.positions[v as usize]))
+        let corner = |v: u32| to_world.transform_point3(mesh.positions[v as usize]);
+        Some(mesh.triangles[triangle as usize].map(corner))
     }
 
     /// The scattering at a surface point that is seen along `wo`.
@@ -225,6 +241,7 @@ impl World {
             let emission = self.emission_towards(p, wo);
             return Shaded::Scatters {
                 weight: Vec3::ONE,
+                opacity: 1.0,
                 vertex: Vertex { bsdf: self.materials.bsdf(p, wo), emission },
             };
         }
@@ -236,8 +253,9 @@ impl World {
         if choice < pass {
             return Shaded::Through { weight: through / pass };
         }
-        let weight = Vec3::splat(self.materials.opacity(p.material, &p.at) / (1.0 - pass));
-        Shaded::Scatters { weight, vertex: Vertex { bsdf: self.materials.bsdf(p, wo), emission } }
+        let opacity = self.materials.opacity(p.material, &p.at);
+        let weight = Vec3::splat(opacity / (1.0 - pass));
+        Shaded::Scatters { weight, opacity, vertex: Vertex { bsdf: self.materials.bsdf(p, wo), emission } }
     }
 
     fn emission_towards(&self, p: &SurfacePoint, wo: Vec3) -> Vec3 {

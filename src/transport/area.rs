@@ -11,7 +11,7 @@ pub const MANY_POINTS: u32 = 4;
 /// The same where the area only decides how much each technique counts.
 pub const FEW_POINTS: u32 = 2;
 /// Most surfaces that are looked at below one coverage point.
-const LAYERS: u32 = 8;
+const LAYERS: u32 = 64;
 
 /// The part of space that a cluster takes.
 pub struct Cell<'a> {
@@ -44,17 +44,18 @@ impl Cell<'_> {
             return None;
         }
         let (low, edge) = self.grid.place(&self.voxel);
-        let [a, b, c] = world.triangle(r.instance, r.triangle).map(|v| (v - low) / edge);
+        let [a, b, c] = world.flat_triangle(r.instance, r.triangle)?.map(|v| (v - low) / edge);
         let n = (b - a).cross(c - a).normalize_or_zero();
         if n == Vec3::ZERO {
             return None;
         }
         let inside = |q: Vec3, from: Vec3, to: Vec3| (to - from).cross(q - from).dot(n) >= 0.0;
         let point = (r.position - low) / edge;
-        plane_cut_corners(point, n)
-            .into_iter()
-            .all(|q| inside(q, a, b) && inside(q, b, c) && inside(q, c, a))
-            .then(|| edge * edge * unit_plane_cut(point, n))
+        let belongs = |q: Vec3| {
+            let same_size = self.grid.has_level_of(low + q * edge, &self.voxel);
+            same_size && inside(q, a, b) && inside(q, b, c) && inside(q, c, a)
+        };
+        plane_cut_corners(point, n).into_iter().all(belongs).then(|| edge * edge * unit_plane_cut(point, n))
     }
 
     /// Stratified estimate: rays through the voxel, along the axis nearest to the normal, meet what of the
@@ -85,7 +86,10 @@ impl Cell<'_> {
             if n[axis] < 0.0 {
                 std::mem::swap(&mut top, &mut bottom);
             }
+            let mut is_first = true;
             world.for_each_surface(top, bottom, LAYERS, |p| {
+                // what lies below another surface may be the inside of it
+                let looks = self.parted.is_some() || !std::mem::replace(&mut is_first, false);
                 let class = world.class(p.material);
                 let ns = match class == SurfaceClass::Transmitting || p.ns.dot(n) > 0.0 {
                     true => p.ns,
@@ -94,7 +98,7 @@ impl Cell<'_> {
                 let there = class == self.representative.class
                     && self.grid.bin(ns) == bin
                     && self.grid.voxel(p.place.position) == self.voxel
-                    && self.parted.is_none_or(|far| hidden(p.place.position, ns) == far);
+                    && (!looks || hidden(p.place.position, ns) == self.parted.unwrap_or(false));
                 if there {
                     // a surface seen edge-on would count without bound
                     sum += 1.0 / p.place.normal[axis].abs().max(0.05);

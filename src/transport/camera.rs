@@ -1,12 +1,13 @@
 //! Sequential sampling from the camera, with a next-event segment at every arrival (S8).
 
-use super::store::{Arrival, CameraStore, EmissionHit, NextEvent, Outgoing};
+use super::arrival::arrival;
+use super::store::{CameraStore, EmissionHit, NextEvent, Outgoing};
 use super::walk::{Chain, End, Follow, Witness};
 use crate::film::FirstHit;
 use crate::math::{Sampler, luminance};
-use crate::shading::bsdf::{Bsdf, Walk};
+use crate::shading::bsdf::Walk;
 use crate::shading::emitters::Receiver;
-use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
+use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfacePoint, Vertex, World};
 use glam::Vec3;
 
 /// What a pixel sees along its primary segment.
@@ -19,7 +20,11 @@ pub struct Primary {
     /// Dirac lobes that it passes.
     pub passages: u32,
     /// Radiance of the lights on it.
+    pub light: Vec3,
+    /// That of lights seen straight.
     pub emission: Vec3,
+    /// That of lights seen by one passage.
+    pub mirrored: Vec3,
     /// Coverage.
     pub alpha: f32,
     /// The first surface on it.
@@ -31,7 +36,9 @@ impl Primary {
         arrival: None,
         weight: Vec3::ZERO,
         passages: 0,
+        light: Vec3::ZERO,
         emission: Vec3::ZERO,
+        mirrored: Vec3::ZERO,
         alpha: 1.0,
         first_hit: None,
     };
@@ -55,41 +62,6 @@ pub struct CameraSampler<'a> {
     pub goes_on: bool,
 }
 
-/// Bounds of the probability that a path goes on. Below one, so that a closed white scene lets go.
-const SURVIVAL: [f32; 2] = [0.05, 0.98];
-
-/// Probability `q` with which a path goes on from a surface: the albedo of what is continuous, given that the
-/// segment ended there.
-pub fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
-    let albedo = bsdf.continuous_albedo(wo).max_element() / end_probability;
-    // false for NaN
-    if albedo > SURVIVAL[0] { albedo.min(SURVIVAL[1]) } else { SURVIVAL[0] }
-}
-
-/// The end of a segment as it is stored; `goes_on` is the caller's to set.
-pub fn arrival(world: &World, end: &End) -> Arrival {
-    let End { hit, vertex, wo, end_probability } = end;
-    let class = world.class(hit.material);
-    let facing = if hit.place.normal.dot(*wo) < 0.0 { -hit.ns } else { hit.ns };
-    let (reflectance, back_pdf) = match (class, vertex.bsdf.lambert()) {
-        (SurfaceClass::Diffuse, Some((r, _))) => (r, vertex.bsdf.continuous_pdf(*wo, *wo).0),
-        _ => (Vec3::ZERO, 0.0),
-    };
-    Arrival {
-        position: hit.place.position,
-        normal: if class == SurfaceClass::Transmitting { hit.ns } else { facing },
-        wo: *wo,
-        instance: hit.instance,
-        triangle: hit.at.triangle,
-        barycentrics: hit.at.barycentrics,
-        reflectance,
-        back_pdf,
-        survival: survival(&vertex.bsdf, *wo, *end_probability),
-        class,
-        goes_on: false,
-    }
-}
-
 /// Collects what the primary segment sees.
 struct Seeing<'a> {
     sampler: &'a CameraSampler<'a>,
@@ -102,7 +74,13 @@ impl Seeing<'_> {
             return;
         }
         let scale = 1.0 / (chain.forward * chain.index * chain.index);
-        self.primary.emission += chain.throughput * radiance * scale;
+        let light = chain.throughput * radiance * scale;
+        self.primary.light += light;
+        match chain.passages {
+            0 => self.primary.emission += light,
+            1 => self.primary.mirrored += light,
+            _ => {}
+        }
     }
 
     fn is_background(&self, chain: &Chain) -> bool {
@@ -151,9 +129,13 @@ struct Meeting<'a> {
 impl Meeting<'_> {
     fn add(&mut self, chain: &Chain, radiance: Vec3, next_event_pdf: f32, emission_pdf: f32) {
         let squeeze = 1.0 / (chain.index * chain.index);
+        let light = chain.throughput * radiance * (self.inverse_n2 * squeeze);
+        if !light.is_finite() {
+            return;
+        }
         self.hits.push(EmissionHit {
             arrival: self.arrival,
-            light: chain.throughput * radiance * (self.inverse_n2 * squeeze),
+            light,
             forward: chain.forward,
             next_event_pdf,
             light_density: self.light_paths * emission_pdf * chain.reverse * squeeze,
@@ -221,7 +203,7 @@ impl CameraSampler<'_> {
             };
             let direction = sample.direction;
             let start_n2 = inverse_n2 / (sample.eta * sample.eta);
-            let light_end = bsdf.end_probability(direction);
+            let light_end = end.probability_from(self.world, direction);
             let mut meeting = Meeting {
                 world: self.world,
                 hits: &mut store.hits,
@@ -277,7 +259,7 @@ impl CameraSampler<'_> {
         let arriving = light.radiance * visible * (inverse_n2 / (index * index));
         let paths = match self.light_paths > 0.0 {
             true => {
-                let ends = bsdf.end_probability(light.direction);
+                let ends = end.probability_from(self.world, light.direction);
                 self.light_paths * ends * self.world.emission_pdf_of_sample(&light)
             }
             false => 0.0,

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Most camera arrivals, and half of the most light arrivals, in a cluster whose lobes are evaluated pair by
 /// pair; larger ones are divided at random.
-const MOST_PAIRED: u32 = 24;
+const MOST_PAIRED: u32 = 16;
 /// By how much points are lifted off their surface before it is asked whether something stands between
 /// them, in edges of the voxel.
 const LIFT: f32 = 0.05;

@@ -10,6 +10,7 @@ use super::propagate::{Reflected, gather, gather_photons, segments};
 use super::weigh::{Sampled, Weights};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::collections::VecDeque;
 
 /// Reflected light of at most so many bounces, carried and of photons.
 struct Level {
@@ -19,18 +20,23 @@ struct Level {
 
 impl Reflected {
     /// As [`Reflected::solve`], for light of at most `bounces` bounces. `first`: for every path, its first
-    /// arrival and the Dirac lobes before it. Returns `false` if it was stopped.
+    /// arrival and the Dirac lobes before it, fewer than `bounces`. Returns `false` if it was stopped.
     pub fn solve_limited(
         &mut self,
         s: Sampled,
         w: &Weights,
-        first: impl Iterator<Item = (u32, u32)>,
+        first: &[(u32, u32)],
         bounces: u32,
         cut: &Cut,
     ) -> bool {
         let n = s.camera.arrivals.len();
         let nothing = || vec![Vec3::ZERO; n];
-        let mut levels = vec![Level { carried: nothing(), photons: nothing() }];
+        // as far back as the longest chain reads
+        let chains = s.camera.outgoing.iter().map(|o| o.passages).chain(first.iter().map(|f| f.1));
+        let kept = 1 + chains.max().unwrap_or(0) as usize;
+        let mut levels = VecDeque::from([Level { carried: nothing(), photons: nothing() }]);
+        // the level of at most `k` bounces, once the last one made is `last`
+        let at = |levels: &VecDeque<Level>, last: u32, k: u32| levels.len() - 1 - (last - k) as usize;
         self.direct = nothing();
         for k in 1..=bounces {
             if cut.is_raised() {
@@ -45,7 +51,7 @@ impl Reflected {
                     let out = &s.camera.outgoing[i];
                     match (k - 1).checked_sub(out.passages) {
                         Some(level) if out.forward > 0.0 => {
-                            let Level { carried, photons } = &levels[level as usize];
+                            let Level { carried, photons } = &levels[at(&levels, k - 1, level)];
                             constants[i].value(carried[i + 1], photons[i + 1])
                         }
                         _ => constants[i].emitted,
@@ -53,17 +59,20 @@ impl Reflected {
                 })
                 .collect();
             let (photons, first_photons) = gather_photons(s, w, Some(k - 1));
-            levels.push(Level { carried: gather(s, w, &values), photons });
+            levels.push_back(Level { carried: gather(s, w, &values), photons });
+            if levels.len() > kept {
+                levels.pop_front();
+            }
             if k == 1 {
-                self.direct.clone_from(&levels[1].carried);
+                self.direct.clone_from(&levels[levels.len() - 1].carried);
                 self.direct.par_iter_mut().zip(first_photons).for_each(|(d, p)| *d += p);
             }
         }
         self.sweeps = bounces;
         (self.carried, self.photons) = (nothing(), nothing());
-        for (arrival, passages) in first {
+        for &(arrival, passages) in first {
             let i = arrival as usize;
-            let level = &levels[bounces.saturating_sub(passages) as usize];
+            let level = &levels[at(&levels, bounces, bounces - passages)];
             (self.carried[i], self.photons[i]) = (level.carried[i], level.photons[i]);
         }
         true

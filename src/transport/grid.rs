@@ -11,7 +11,7 @@ use glam::{IVec3, Mat3, Quat, Vec2, Vec3};
 use std::f32::consts::TAU;
 
 /// Bins of normals along each axis of their octahedral map.
-const NORMAL_BINS: f32 = 4.0;
+const NORMAL_BINS: f32 = 6.0;
 /// Largest exponent of an edge, either way: what a footprint of zero or infinity gets.
 const MAX_LEVEL: i32 = 100;
 
@@ -50,11 +50,20 @@ impl<'a> Grid<'a> {
 
     /// The voxel of a point. On average over the jitter the logarithm of its edge is that of the kernel.
     pub fn voxel(&self, p: Vec3) -> Voxel {
-        let size = (self.edge * self.sensor.pixel_footprint(p)).log2() + self.level_jitter;
-        // a conversion of NaN or an infinity saturates
-        let level = (size.floor() as i32).clamp(-MAX_LEVEL, MAX_LEVEL);
+        let level = self.level(p);
         let at = (p / edge(level) + self.offset).floor().as_ivec3();
         Voxel { level, at }
+    }
+
+    /// Whether the voxels are as large at a point as this one.
+    pub fn has_level_of(&self, p: Vec3, voxel: &Voxel) -> bool {
+        self.level(p) == voxel.level
+    }
+
+    fn level(&self, p: Vec3) -> i32 {
+        let size = (self.edge * self.sensor.pixel_footprint(p)).log2() + self.level_jitter;
+        // a conversion of NaN or an infinity saturates
+        (size.floor() as i32).clamp(-MAX_LEVEL, MAX_LEVEL)
     }
 
     /// Lower corner and edge of a voxel.
@@ -166,7 +175,7 @@ mod tests {
             let grid = Grid::new(&sensor, 4.0, seed);
             for p in points(100) {
                 let n = p.normalize();
-                assert!(grid.bin(n) < 16);
+                assert!(grid.bin(n) < 36);
                 assert_ne!(grid.bin(n), grid.bin(-n));
             }
         }

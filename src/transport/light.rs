@@ -1,6 +1,6 @@
 //! Sequential sampling from the lights.
 
-use super::camera::arrival;
+use super::arrival::arrival;
 use super::store::{LightStore, Photon, Rivals};
 use super::walk::{Chain, End, Follow, Nobody};
 use crate::math::Sampler;
@@ -39,7 +39,9 @@ impl LightSampler<'_> {
             arrived.goes_on = sample.is_some();
             store.arrivals.push(arrived);
             let (direction, pdf) = sample.map_or((Vec3::ZERO, 0.0), |s| (s.direction, s.pdf.value()));
-            store.photons.push(Photon { flux, bounces, rivals, camera_choices, direction, pdf });
+            // the camera segment that gathers it is as opaque at its end
+            let flux_there = flux / end.opacity;
+            store.photons.push(Photon { flux: flux_there, bounces, rivals, camera_choices, direction, pdf });
             let Some(sample) = sample else { return };
             let value = match arrived.class {
                 SurfaceClass::Diffuse => sample.value,
@@ -47,7 +49,7 @@ impl LightSampler<'_> {
                 _ => self.world.bsdf(&end.hit, direction).eval_flux(end.wo, direction),
             };
             flux *= value / (pdf * arrived.survival);
-            let camera_end = bsdf.end_probability(direction);
+            let camera_end = end.probability_from(self.world, direction);
             let piece = Piece::leaving(&end.hit, direction);
             let (chain, next) = follow.segment(piece, sampler, &mut Nobody, rays);
             let Some(next) = next else { return };

@@ -2,6 +2,7 @@
 //! propagate, gather. `docs/method.md` tells the method in one piece.
 
 pub mod area;
+pub mod arrival;
 pub mod camera;
 pub mod cluster;
 pub mod depth;

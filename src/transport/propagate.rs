@@ -11,7 +11,7 @@ use super::store::Rivals;
 use super::weigh::{Sampled, Weights};
 use crate::math::luminance;
 use crate::shading::SurfaceClass;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Change of the mean, relative to it, below which sweeping stops.
@@ -53,8 +53,10 @@ impl Segment {
     }
 }
 
+/// One over a density; zero where there is none, or so little that nothing can have come of it.
 fn reciprocal(density: f32) -> f32 {
-    if density > 0.0 { 1.0 / density } else { 0.0 }
+    let r = 1.0 / density;
+    if density > 0.0 && r.is_finite() { r } else { 0.0 }
 }
 
 impl Reflected {
@@ -97,8 +99,8 @@ impl Reflected {
                 break;
             }
         }
-        let emitted: Vec<Vec3> = self.segments.iter().map(|segment| segment.emitted).collect();
-        self.direct = gather(s, w, &emitted);
+        let straight: Vec<Vec3> = segments(s, w, Some(0)).iter().map(|segment| segment.emitted).collect();
+        self.direct = gather(s, w, &straight);
         self.direct.par_iter_mut().zip(first_photons).for_each(|(d, p)| *d += p);
         true
     }
@@ -185,7 +187,9 @@ fn photon_value(s: Sampled, w: &Weights, c: &Cluster, j: usize) -> Vec3 {
     let (own, others) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
             let met = if is_delta { 0.0 } else { camera };
-            (light_density, met + next_event_pdf * c.cameras as f32 / c.area)
+            // NaN only where the light grazes the surface
+            let others = met + next_event_pdf * c.cameras as f32 / c.area;
+            (light_density, if others.is_nan() { f32::INFINITY } else { others })
         }
         Rivals::Later { light_choices, squeeze } => {
             let place = s.light_place(j - 1);
@@ -261,9 +265,9 @@ pub(super) fn gather(s: Sampled, w: &Weights, values: &[Vec3]) -> Vec<Vec3> {
             let mut out = Vec::new();
             for (k, c) in batch {
                 let direct = &w.direct[c.camera_places()];
-                let leaving = s.cameras(c).map(|i| values[i] * s.camera.outgoing[i].pdf);
+                let leaving = s.cameras(c).map(|i| (values[i] * s.camera.outgoing[i].pdf).as_dvec3());
                 let shared = match c.class {
-                    SurfaceClass::Diffuse => leaving.sum::<Vec3>() / c.area,
+                    SurfaceClass::Diffuse => leaving.sum::<DVec3>().as_vec3() / c.area,
                     _ => Vec3::ZERO,
                 };
                 for (row, i) in s.cameras(c).enumerate() {

@@ -44,8 +44,21 @@ pub struct End {
     pub vertex: Vertex,
     /// Unit direction back along the segment.
     pub wo: Vec3,
+    /// Share of the surface that is there: a factor of the segment's throughput.
+    pub opacity: f32,
     /// Probability that a segment which arrives so ends here.
     pub end_probability: f32,
+}
+
+impl End {
+    /// Probability that a segment which arrives from `from` ends here.
+    pub fn probability_from(&self, world: &World, from: Vec3) -> f32 {
+        match self.vertex.bsdf.has_delta() {
+            // layers hide each other by the direction they are seen from
+            true => world.bsdf(&self.hit, from).end_probability(from),
+            false => 1.0,
+        }
+    }
 }
 
 /// What is told of a segment while it is followed.
@@ -103,15 +116,15 @@ impl Follow<'_> {
             };
             let wo = -piece.direction;
             let choice = if world.needs().transparency { sampler.next_1d() } else { 0.0 };
-            let vertex = match world.shade(&hit, wo, choice) {
+            let (vertex, opacity) = match world.shade(&hit, wo, choice) {
                 Shaded::Through { weight } => {
                     chain.throughput *= weight;
                     piece = piece.beyond(&hit);
                     continue;
                 }
-                Shaded::Scatters { weight, vertex } => {
+                Shaded::Scatters { weight, opacity, vertex } => {
                     chain.throughput *= weight;
-                    vertex
+                    (vertex, opacity)
                 }
             };
             if sees_lights && vertex.emission != Vec3::ZERO {
@@ -127,7 +140,7 @@ impl Follow<'_> {
                 Event::Ends => {
                     let end_probability = vertex.bsdf.end_probability(wo);
                     chain.forward *= end_probability;
-                    return (chain, Some(End { hit, vertex, wo, end_probability }));
+                    return (chain, Some(End { hit, vertex, wo, opacity, end_probability }));
                 }
                 Event::Passes(passage) => {
                     chain.throughput *= passage.coefficient;

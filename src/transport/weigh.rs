@@ -6,11 +6,11 @@
 //! lobes are kept for the gathering.
 
 use super::Cut;
-use super::cluster::{Cluster, Clusters, Numbered};
+use super::cluster::{Cluster, Clusters};
 use super::store::{CameraStore, LightStore, NextEvent};
 use crate::shading::bsdf::Bsdf;
 use crate::shading::{SurfaceClass, World};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Densities of one arrival.
@@ -61,11 +61,6 @@ pub struct Sampled<'a> {
 }
 
 impl<'a> Sampled<'a> {
-    /// The arrivals, by number.
-    pub fn numbered(&self) -> Numbered<'a> {
-        Numbered { camera: &self.camera.arrivals, light: &self.light.arrivals }
-    }
-
     /// Indices of the cluster's camera arrivals.
     pub fn cameras(&self, c: &Cluster) -> impl ExactSizeIterator<Item = usize> + Clone + use<'a> {
         let order = &self.clusters.order;
@@ -95,6 +90,8 @@ struct Batch {
 impl Weights {
     /// Weighs all segments. Returns `false` if it was stopped.
     pub fn weigh(&mut self, s: Sampled, cut: &Cut) -> bool {
+        // the lobes' values are most of the memory: not twice
+        self.values.clear();
         let batches: Vec<Batch> = s
             .clusters
             .clusters
@@ -121,7 +118,6 @@ impl Weights {
         self.densities.clear();
         self.direct.clear();
         self.matrices.clear();
-        self.values.clear();
         for (b, batch) in (0..).zip(batches) {
             self.densities.extend(batch.densities);
             self.direct.extend(batch.direct);
@@ -164,14 +160,14 @@ fn diffuse(s: Sampled, c: &Cluster, batch: &mut Batch) {
     let sum = |q: &mut dyn Iterator<Item = f32>| q.map(f64::from).sum::<f64>();
     let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals[i].survival)) as f32;
     let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals[j].survival));
-    let mut arriving = Vec3::ZERO;
+    let mut arriving = DVec3::ZERO;
     for i in s.cameras(c) {
         let n = &s.camera.next_events[i];
         if n.next_event_pdf > 0.0 {
-            arriving += next_event_value(n, q_camera * n.pdf, c) * n.pdf;
+            arriving += (next_event_value(n, q_camera * n.pdf, c) * n.pdf).as_dvec3();
         }
     }
-    arriving /= c.area;
+    let arriving = arriving.as_vec3() / c.area;
     for i in s.cameras(c) {
         let a = &s.camera.arrivals[i];
         batch.densities.push(Density {

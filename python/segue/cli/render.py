@@ -74,7 +74,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="the picture; a .png is written in addition to an .exr beside it, tonemapped "
         f"({output.TONEMAPPING}). With --frames the number replaces #### or %%04d",
     )
-    add("--integrator", metavar="NAME", help="method (default: the engine's)")
+    add("--integrator", metavar="NAME", help="method: segment (default) or path")
+    add(
+        "--kernel",
+        choices=("progressive", "fixed"),
+        help="whether the kernel of the segment method shrinks (default) or stays",
+    )
+    add(
+        "--kernel-size",
+        type=_positive,
+        metavar="PIXELS",
+        help="edge of the segment method's kernel in the first iteration (default: 4)",
+    )
     stop = parser.add_mutually_exclusive_group()
     stop.add_argument("--samples", type=_count, metavar="N", help="stop after N samples a pixel")
     stop.add_argument("--time", type=_positive, metavar="SECONDS", help="stop after this time")
@@ -149,6 +160,10 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
     settings: dict[str, Any] = {"threads": options.threads, "seed": options.seed}
     if options.integrator:
         settings["integrator"] = options.integrator
+    if options.kernel:
+        settings["kernel"] = options.kernel
+    if options.kernel_size:
+        settings["kernel_size"] = options.kernel_size
     if options.max_depth is not None:
         settings["max_depth"] = options.max_depth
     if options.passes:

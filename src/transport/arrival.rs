@@ -1,0 +1,42 @@
+//! Ends of segments, made ready for the store.
+
+use super::store::Arrival;
+use super::walk::End;
+use crate::shading::bsdf::Bsdf;
+use crate::shading::{SurfaceClass, World};
+use glam::Vec3;
+
+/// Bounds of the probability that a path goes on. Below one, so that a closed white scene lets go.
+const SURVIVAL: [f32; 2] = [0.05, 0.98];
+
+/// Probability `q` with which a path goes on from a surface: the albedo of what is continuous, given that the
+/// segment ended there.
+fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
+    let albedo = bsdf.continuous_albedo(wo).max_element() / end_probability;
+    // false for NaN
+    if albedo > SURVIVAL[0] { albedo.min(SURVIVAL[1]) } else { SURVIVAL[0] }
+}
+
+/// The end of a segment as it is stored; `goes_on` is the caller's to set.
+pub fn arrival(world: &World, end: &End) -> Arrival {
+    let End { hit, vertex, wo, end_probability, .. } = end;
+    let class = world.class(hit.material);
+    let facing = if hit.place.normal.dot(*wo) < 0.0 { -hit.ns } else { hit.ns };
+    let (reflectance, back_pdf) = match (class, vertex.bsdf.lambert()) {
+        (SurfaceClass::Diffuse, Some((r, _))) => (r, vertex.bsdf.continuous_pdf(*wo, *wo).0),
+        _ => (Vec3::ZERO, 0.0),
+    };
+    Arrival {
+        position: hit.place.position,
+        normal: if class == SurfaceClass::Transmitting { hit.ns } else { facing },
+        wo: *wo,
+        instance: hit.instance,
+        triangle: hit.at.triangle,
+        barycentrics: hit.at.barycentrics,
+        reflectance,
+        back_pdf,
+        survival: survival(&vertex.bsdf, *wo, *end_probability),
+        class,
+        goes_on: false,
+    }
+}
