@@ -1,7 +1,7 @@
 //! Segment-based light transport: the whole method, iteration by iteration.
 
 use super::{Context, Integrator, IterationEnd, StageCosts};
-use crate::film::Sample;
+use crate::film::{Pass, Sample};
 use crate::math::Sampler;
 use crate::math::sampler::hash;
 use crate::transport::camera::{CameraSampler, Primary};
@@ -89,8 +89,10 @@ impl Segment {
             return false;
         }
         costs.stage("weights", self.weights.bytes());
+        let passes = context.film.passes();
+        let wants_direct = passes.contains(Pass::Direct) || passes.contains(Pass::Indirect);
         let solved = match context.max_depth {
-            None => self.reflected.solve(sampled, &self.weights, &self.starts, cut),
+            None => self.reflected.solve(sampled, &self.weights, &self.starts, wants_direct, cut),
             Some(bounces) => {
                 let first = self.primaries.iter().filter_map(|p| Some((p.arrival?, p.passages)));
                 let first: Vec<_> = first.filter(|&(_, passages)| passages < bounces).collect();
@@ -183,8 +185,11 @@ impl Segment {
             let p = &self.primaries[y as usize * width + x as usize];
             let (reflected, direct) = match p.arrival.map(|a| a as usize) {
                 Some(a) => {
-                    let direct = if p.passages == 0 { self.reflected.direct[a] } else { Vec3::ZERO };
-                    (self.reflected.carried[a] + self.reflected.photons[a], direct)
+                    let direct = self.reflected.direct.get(a).filter(|_| p.passages == 0);
+                    (
+                        self.reflected.carried[a] + self.reflected.photons[a],
+                        direct.copied().unwrap_or(Vec3::ZERO),
+                    )
                 }
                 None => (Vec3::ZERO, Vec3::ZERO),
             };

@@ -50,7 +50,7 @@ pub struct World {
 }
 
 /// A surface point, shaded.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Vertex {
     /// How it scatters. Without transparency, which is visibility's.
     pub bsdf: Bsdf,
@@ -59,7 +59,7 @@ pub struct Vertex {
 }
 
 /// What a ray does at a surface.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant)] // the large one is the usual one
 pub enum Shaded {
     /// It passes straight through.

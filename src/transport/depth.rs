@@ -6,11 +6,15 @@
 //! with `m` of them reads what its end reflected `m` sweeps before.
 
 use super::Cut;
-use super::propagate::{Reflected, gather, gather_photons, segments};
+use super::exchange::{emitted, gather, gather_photons, has_end, photon_values, segments};
+use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::VecDeque;
+
+/// Fewest arrivals that one task takes.
+const GRAIN: usize = 512;
 
 /// Reflected light of at most so many bounces, carried and of photons.
 struct Level {
@@ -38,28 +42,30 @@ impl Reflected {
         // the level of at most `k` bounces, once the last one made is `last`
         let at = |levels: &VecDeque<Level>, last: u32, k: u32| levels.len() - 1 - (last - k) as usize;
         self.direct = nothing();
+        let (constants, values) = (segments(s, w), photon_values(s, w));
         for k in 1..=bounces {
             if cut.is_raised() {
                 return false;
             }
-            // light met after k passages has bounced once more on its way
-            let constants = segments(s, w, Some(k - 1));
-            let values: Vec<Vec3> = (0..n)
+            let brought: Vec<Vec3> = (0..n)
                 .into_par_iter()
-                .with_min_len(1024)
+                .with_min_len(GRAIN)
                 .map(|i| {
-                    let out = &s.camera.outgoing[i];
-                    match (k - 1).checked_sub(out.passages) {
-                        Some(level) if out.forward > 0.0 => {
+                    // light met after k passages has bounced once more on its way
+                    let met = emitted(s, w, i, Some(k - 1));
+                    match (k - 1).checked_sub(s.camera.outgoing[i].passages) {
+                        Some(level) if has_end(s, i) => {
                             let Level { carried, photons } = &levels[at(&levels, k - 1, level)];
-                            constants[i].value(carried[i + 1], photons[i + 1])
+                            let all = &constants[i];
+                            all.value(carried[i + 1], photons[i + 1]) - all.emitted + met
                         }
-                        _ => constants[i].emitted,
+                        _ => met,
                     }
                 })
                 .collect();
-            let (photons, first_photons) = gather_photons(s, w, Some(k - 1));
-            levels.push_back(Level { carried: gather(s, w, &values), photons });
+            let photons = gather_photons(s, w, &values, cut, |p| p.bounces < k);
+            let first_photons = if k == 1 { photons.clone() } else { Vec::new() };
+            levels.push_back(Level { carried: gather(s, w, &brought, cut), photons });
             if levels.len() > kept {
                 levels.pop_front();
             }
@@ -68,7 +74,6 @@ impl Reflected {
                 self.direct.par_iter_mut().zip(first_photons).for_each(|(d, p)| *d += p);
             }
         }
-        self.sweeps = bounces;
         (self.carried, self.photons) = (nothing(), nothing());
         for &(arrival, passages) in first {
             let i = arrival as usize;

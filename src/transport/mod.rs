@@ -6,6 +6,7 @@ pub mod arrival;
 pub mod camera;
 pub mod cluster;
 pub mod depth;
+mod exchange;
 pub mod grid;
 pub mod kernel;
 pub mod light;

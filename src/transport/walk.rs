@@ -36,7 +36,7 @@ impl Chain {
 }
 
 /// Where a generalised segment ends: a surface with a continuous lobe.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct End {
     /// The surface point.
     pub hit: SurfacePoint,

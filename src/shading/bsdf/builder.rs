@@ -2,8 +2,9 @@
 
 use super::{Bsdf, Entry};
 use crate::math::Frame;
-use crate::shading::lobes::{Lambert, Lobe};
+use crate::shading::lobes::Lobe;
 use glam::Vec3;
+use smallvec::SmallVec;
 
 /// Most lobes that one surface point can have.
 pub const CAPACITY: usize = 10;
@@ -18,13 +19,7 @@ pub struct BsdfBuilder {
 impl BsdfBuilder {
     /// No lobes yet. `ng`: unit geometric normal, pointing out of the object.
     pub fn new(ng: Vec3) -> Self {
-        let empty = Entry {
-            weight: Vec3::ZERO,
-            frame: Frame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z },
-            lobe: Lobe::Lambert(Lambert),
-            delta: false,
-        };
-        Self { bsdf: Bsdf { ng, eta: 1.0, len: 0, entries: [empty; CAPACITY] }, dropped: 0 }
+        Self { bsdf: Bsdf { ng, eta: 1.0, entries: SmallVec::new() }, dropped: 0 }
     }
 
     /// Adds a lobe. The normal of `frame` is the shading normal; it is turned to the side of the
@@ -60,12 +55,11 @@ impl BsdfBuilder {
         if entry.weight == Vec3::ZERO {
             return;
         }
-        if self.bsdf.len == CAPACITY {
+        if self.bsdf.entries.len() == CAPACITY {
             self.dropped += 1;
             return;
         }
-        self.bsdf.entries[self.bsdf.len] = entry;
-        self.bsdf.len += 1;
+        self.bsdf.entries.push(entry);
     }
 
     /// How many lobes did not fit; the caller counts and reports them.

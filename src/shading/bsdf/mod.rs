@@ -22,6 +22,7 @@ use super::lobes::{Density, Kind, Lobe, MIN_COS, Side};
 use crate::math::density::{DiscreteProbability, ProjectedPdf};
 use crate::math::{Frame, ONE_MINUS_EPSILON};
 use glam::Vec3;
+use smallvec::SmallVec;
 
 /// Which way a path is being built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,14 +98,14 @@ impl Entry {
 }
 
 /// The scattering of light at one surface point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Bsdf {
     ng: Vec3,
     /// Refractive index below the surface over that above it, for what continuous lobes transmit: that
     /// of the refracting lobe of most weight.
     eta: f32,
-    len: usize,
-    entries: [Entry; CAPACITY],
+    /// Few surfaces have more than two, and this is copied often.
+    entries: SmallVec<[Entry; 2]>,
 }
 
 impl Bsdf {
@@ -124,7 +125,7 @@ impl Bsdf {
     /// Whether nothing scatters.
     #[inline]
     pub fn is_black(&self) -> bool {
-        self.len == 0
+        self.entries.is_empty()
     }
 
     /// Whether some lobe is a Dirac delta.
@@ -155,7 +156,7 @@ impl Bsdf {
 
     #[inline]
     fn entries(&self) -> &[Entry] {
-        &self.entries[..self.len]
+        &self.entries
     }
 
     /// Refractive index on the side of `to` over that on the side of `from`, for light that a continuous
@@ -247,7 +248,7 @@ impl Bsdf {
     #[inline]
     fn side_of(&self, from: Vec3) -> Option<f32> {
         let cos = self.ng.dot(from);
-        (self.len > 0 && cos.abs() >= MIN_COS).then(|| 1f32.copysign(cos))
+        (!self.is_black() && cos.abs() >= MIN_COS).then(|| 1f32.copysign(cos))
     }
 
     /// Draws a direction from lobe `k`, which `choice` chose.
@@ -321,7 +322,8 @@ impl Choice {
     fn among(bsdf: &Bsdf, from: Vec3, side: f32, wanted: impl Fn(&Entry) -> bool) -> Self {
         let mut cumulative = [0.0; CAPACITY];
         let mut sum = 0.0;
-        if bsdf.len == 1 {
+        let len = bsdf.entries.len();
+        if len == 1 {
             cumulative[0] = 1.0;
             return Self { len: 1, cumulative };
         }
@@ -334,10 +336,10 @@ impl Choice {
             sum += (e.weight * albedo.max(Vec3::splat(MIN_CHOICE))).element_sum();
             *c = sum;
         }
-        for c in &mut cumulative[..bsdf.len] {
+        for c in &mut cumulative[..len] {
             *c /= sum;
         }
-        Self { len: bsdf.len, cumulative }
+        Self { len, cumulative }
     }
 
     #[inline]

@@ -182,7 +182,7 @@ def case_settings_reach_the_engine() -> None:
     builders.render()
     found = fake_segue.RENDERS[-1].settings
     wanted = {
-        "integrator": "path",
+        "integrator": "segment",
         "samples": 9,
         "time": 12.5,
         "noise_threshold": 0.125,
