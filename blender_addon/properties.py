@@ -16,8 +16,8 @@ class SegueSceneSettings(bpy.types.PropertyGroup):
             (
                 "segment",
                 "Segments",
-                "Segments from the camera and from the lights, gathered in small clusters: finds caustics and "
-                "light behind glass",
+                "Segments from the camera and from the lights, gathered in small clusters: "
+                "finds caustics and light behind glass",
             ),
             ("path", "Path Tracing", "Unidirectional path tracing with next-event estimation"),
         ],

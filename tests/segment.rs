@@ -127,6 +127,19 @@ fn glossy_and_layered_surfaces_agree() {
     }
 }
 
+/// A surface that transmits shares its clusters between both sides, and with them the lights that only the other
+/// side can use: losing those would be a bias that grows with the kernel.
+#[test]
+fn transmitting_surfaces_keep_their_light_under_large_kernels() {
+    let mut s = corner(r#"{"surface":{"type":"translucent","color":0.8}}"#, WALL);
+    s.light(RECT);
+    let reference = estimate(&s, 48, 128, Pass::Combined, PATH);
+    for (name, set) in &SETS[..2] {
+        let settings = format!(r#","integrator":"segment","kernel":"fixed","kernel_size":3{set}"#);
+        assert_agree(name, estimate(&s, 48, 48, Pass::Combined, &settings), reference, 5e-3);
+    }
+}
+
 #[test]
 fn delta_lights_and_the_sun_agree() {
     for light in [POINT, DISTANT, &DISTANT.replace(r#""angle":3"#, r#""angle":0"#)] {

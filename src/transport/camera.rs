@@ -7,7 +7,7 @@ use crate::film::FirstHit;
 use crate::math::{Sampler, luminance};
 use crate::shading::bsdf::Walk;
 use crate::shading::emitters::Receiver;
-use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfacePoint, Vertex, World};
+use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
 use glam::Vec3;
 
 /// What a pixel sees along its primary segment.
@@ -248,7 +248,9 @@ impl CameraSampler<'_> {
         let bsdf = &end.vertex.bsdf;
         let cos = end.hit.place.normal.dot(light.direction).abs();
         let pdf = bsdf.continuous_pdf(end.wo, light.direction).0;
-        if pdf <= 0.0 || cos <= 0.0 {
+        // arrivals from the other side of a surface that transmits share its cluster, and may use what this one cannot
+        let is_shared = self.world.class(end.hit.material) == SurfaceClass::Transmitting;
+        if cos <= 0.0 || (pdf <= 0.0 && !is_shared) {
             return NextEvent::default();
         }
         let visible = self.world.transmittance(&end.hit, &light, rays);

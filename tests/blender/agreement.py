@@ -68,9 +68,17 @@ def _cycles(scene: bpy.types.Scene, samples: int) -> None:
 
 
 def render_both(
-    width: int, height: int, cycles_samples: int, segue_samples: int
+    width: int,
+    height: int,
+    cycles_samples: int,
+    segue_samples: int,
+    integrator: str = "path",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The scene as Cycles and as Segue render it: (height, width, 4), linear."""
+    """The scene as Cycles and as Segue render it: (height, width, 4), linear.
+
+    By default Segue traces paths, as Cycles does: at so few pixels the kernel of the segment
+    method, which is some pixels wide, would be part of the comparison.
+    """
     pictures = []
     for engine in ("CYCLES", "SEGUE"):
         scene = builders.settings(width, height, engine)
@@ -79,6 +87,7 @@ def render_both(
         scene.render.filepath = str(builders.OUTPUT / f"{engine}.exr")
         _cycles(scene, cycles_samples)
         scene.segue.samples = segue_samples
+        scene.segue.integrator = integrator
         scene.segue.pixel_filter = "box"
         scene.segue.filter_width = 1.0
         builders.render(write_still=True)

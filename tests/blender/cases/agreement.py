@@ -98,7 +98,7 @@ def _instances() -> None:
         empty.instance_type, empty.instance_collection = "COLLECTION", collection
 
 
-def case_a_whole_scene() -> None:
+def _a_whole_scene(integrator: str) -> None:
     """Ten materials, instances, an environment map and four lights."""
     _environment(_sky(), (0.1, -0.2, 0.8), 0.6)
     floor = builders.quad("Floor", 8.0)
@@ -128,8 +128,16 @@ def case_a_whole_scene() -> None:
                    shape="RECTANGLE", color=(1.0, 0.8, 0.6))  # fmt: skip
     pose = Matrix.Translation((0, -7, 4)) @ Euler((1.05, 0, 0)).to_matrix().to_4x4()
     builders.camera(pose, lens=40.0)
-    pictures = agreement.render_both(160, 120, 128, 128)
+    pictures = agreement.render_both(160, 120, 128, 128, integrator)
     _check(agreement.compare(*pictures), mean=0.005, blocks=0.02, correlation=0.999)
+
+
+def case_a_whole_scene() -> None:
+    _a_whole_scene("path")
+
+
+def case_a_whole_scene_by_segments() -> None:
+    _a_whole_scene("segment")
 
 
 # Name -> shader node and its inputs. Both engines define these alike, but for two things that keep

@@ -115,7 +115,7 @@ def case_transparent_film() -> None:
 
 def case_border_is_a_part_of_the_whole() -> None:
     scene = _scene()
-    scene.segue.samples = 1
+    scene.segue.samples, scene.segue.integrator = 1, "path"
     data = builders.sphere()
     data.materials.append(builders.shader_material("BsdfDiffuse"))
     builders.link(data, matrix=Matrix.Translation((0.5, 0, 2)))
