@@ -39,6 +39,8 @@ impl StopSign {
 pub struct Counters {
     /// Rays traced, shadow rays included.
     pub rays: AtomicU64,
+    /// Segments of the last iteration, where there are any.
+    pub segments: AtomicU64,
     /// Seconds spent in each stage, and the bytes that it holds.
     pub stages: Mutex<BTreeMap<&'static str, (f64, u64)>>,
 }

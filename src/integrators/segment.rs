@@ -73,16 +73,23 @@ impl Segment {
         if !self.sample_camera(context, index, light_paths, cut) {
             return false;
         }
-        self.sample_light(context, index, light_paths as u32, cut);
+        if !self.sample_light(context, index, light_paths as u32, cut) {
+            return false;
+        }
         costs.stage("sampling", self.camera.bytes() + self.light.bytes());
 
         let edge = self.techniques.kernel.edge(context.completed);
         let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index));
         let all = Numbered { camera: &self.camera.arrivals, light: &self.light.arrivals };
-        if !self.clusters.build(world, &grid, all, light_paths > 0.0, cut) {
+        if !self.clusters.group(world, &grid, all, cut) {
             return false;
         }
         costs.stage("clustering", self.clusters.bytes());
+        if !self.clusters.measure(world, &grid, all, light_paths > 0.0, cut) {
+            return false;
+        }
+        costs.stage("areas", 0);
+        context.counters.segments.store(self.segments() as u64, Relaxed);
 
         let sampled = Sampled { world, camera: &self.camera, light: &self.light, clusters: &self.clusters };
         if !self.weights.weigh(sampled, cut) {
@@ -152,7 +159,7 @@ impl Segment {
         true
     }
 
-    fn sample_light(&mut self, context: &Context, index: u32, paths: u32, cut: &Cut) {
+    fn sample_light(&mut self, context: &Context, index: u32, paths: u32, cut: &Cut) -> bool {
         let sampler = LightSampler {
             world: context.world,
             paths: paths as f32,
@@ -176,6 +183,12 @@ impl Segment {
             .collect();
         self.light.clear();
         batches.into_iter().for_each(|mut store| self.light.append(&mut store));
+        !cut.is_raised()
+    }
+
+    /// Segments of this iteration.
+    fn segments(&self) -> usize {
+        self.camera.segments(self.primaries.len()) + self.light.arrivals.len()
     }
 
     /// One sample for every pixel.

@@ -336,6 +336,8 @@ impl Session {
         let state = locked(&self.state);
         let mut stages = self.build.clone();
         let counted = locked(&self.counters.stages);
+        let segments = self.counters.segments.load(Relaxed);
+        let held: u64 = counted.values().map(|&(_, bytes)| bytes).sum();
         for (&name, &(seconds, bytes)) in counted.iter() {
             stages.insert(name.into(), Stage { seconds, bytes });
         }
@@ -352,6 +354,8 @@ impl Session {
             build_seconds: self.build.values().map(|s| s.seconds).sum(),
             samples: self.mean_samples(),
             rays: self.counters.rays.load(Relaxed),
+            segments,
+            bytes_per_segment: held as f64 / segments.max(1) as f64,
             peak_memory_bytes: clock::peak_memory_bytes(),
             non_finite: self.film.rejected_samples(),
             estimated_error: state.estimated_error,

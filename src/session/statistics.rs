@@ -51,6 +51,8 @@ pub struct Statistics {
     pub build_seconds: f64,
     pub samples: f64,
     pub rays: u64,
+    pub segments: u64,
+    pub bytes_per_segment: f64,
     pub peak_memory_bytes: u64,
     pub non_finite: u64,
     pub estimated_error: Option<f64>,

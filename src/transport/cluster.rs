@@ -1,8 +1,9 @@
 //! Clusters: arrivals that share a voxel, a bin of normals and a class of surface.
 
+use super::Cut;
+use super::area::{Cell, FEW_POINTS, MANY_POINTS};
 use super::grid::Grid;
 use super::store::Arrival;
-use super::{Cut, area};
 use crate::math::sampler::hash;
 use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
@@ -15,6 +16,8 @@ const MOST_PAIRED: u32 = 16;
 /// By how much points are lifted off their surface before it is asked whether something stands between
 /// them, in edges of the voxel.
 const LIFT: f32 = 0.05;
+/// Fewest voxels or clusters that one task takes.
+const GRAIN: usize = 64;
 
 /// A cluster. Its arrivals are neighbours in [`Clusters::order`]: the camera's first, then the lights'.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +32,12 @@ pub struct Cluster {
     pub area: f32,
     /// Class of its surfaces.
     pub class: SurfaceClass,
+    /// Arrival in whose voxel it is.
+    representative: u32,
+    /// Where something divides the voxel: whether this is the part that the representative does not see.
+    parted: Option<bool>,
+    /// Clusters that share its part of the voxel at random, itself included.
+    parts: u32,
 }
 
 impl Cluster {
@@ -80,59 +89,70 @@ impl<'a> Numbered<'a> {
     }
 }
 
-/// A cluster while it is being made.
-struct Draft {
-    members: Vec<u32>,
-    area: f32,
-    class: SurfaceClass,
-}
-
 impl Clusters {
-    /// Clusters the arrivals. `areas_count`: whether light paths are sampled; without them areas cancel.
-    /// Returns `false` if it was stopped.
-    pub fn build(&mut self, world: &World, grid: &Grid, all: Numbered, areas_count: bool, cut: &Cut) -> bool {
+    /// Clusters the arrivals; areas are left to [`Clusters::measure`]. Returns `false` if it was stopped.
+    pub fn group(&mut self, world: &World, grid: &Grid, all: Numbered, cut: &Cut) -> bool {
         let n = all.len();
         self.keys.clear();
         self.keys.par_extend((0..n as u32).into_par_iter().map(|i| (grid.key(all.get(i)), i)));
+        if cut.is_raised() {
+            return false;
+        }
         // numbers make the order unique, so it does not depend on the threads
         self.keys.par_sort_unstable();
         let groups: Vec<&[(u64, u32)]> = self.keys.chunk_by(|a, b| a.0 == b.0).collect();
-        let cameras = all.camera.len() as u32;
-        let drafts: Vec<Draft> = groups
+        let hidden: Vec<bool> = groups
             .par_iter()
-            .with_min_len(64)
-            .flat_map_iter(|group| match cut.is_raised() {
-                true => Vec::new(),
-                false => drafts(world, grid, all, group, areas_count),
+            .with_min_len(GRAIN)
+            .flat_map_iter(|group| {
+                let hub = Hub::new(grid, all.get(group[0].1));
+                // the representative sees itself
+                let others = group[1..].iter().map(move |&(_, i)| {
+                    let a = all.get(i);
+                    !cut.is_raised() && hub.is_hidden(world, a.position, a.normal)
+                });
+                std::iter::once(false).chain(others)
             })
             .collect();
         if cut.is_raised() {
             return false;
         }
-        self.order.clear();
-        self.clusters.clear();
+        let mut layout = Layout { cameras: all.camera.len() as u32, ..Layout::default() };
+        (layout.order, layout.clusters) =
+            (std::mem::take(&mut self.order), std::mem::take(&mut self.clusters));
+        layout.order.clear();
+        layout.clusters.clear();
+        let mut at = 0;
+        for group in &groups {
+            let hidden = &hidden[at..at + group.len()];
+            at += group.len();
+            layout.add(group, hidden, all.get(group[0].1).class);
+        }
+        (self.order, self.clusters) = (layout.order, layout.clusters);
         self.place.clear();
         self.place.resize(n, 0);
         self.of.clear();
         self.of.resize(n, 0);
-        for draft in drafts {
-            let first = self.order.len() as u32;
-            let c = self.clusters.len() as u32;
-            for &i in &draft.members {
-                self.place[i as usize] = self.order.len() as u32;
-                self.of[i as usize] = c;
-                self.order.push(i);
+        for (c, cluster) in (0..).zip(&self.clusters) {
+            for place in cluster.first..cluster.first + cluster.cameras + cluster.lights {
+                let i = self.order[place as usize] as usize;
+                (self.place[i], self.of[i]) = (place, c);
             }
-            let from_camera = draft.members.iter().take_while(|&&i| i < cameras).count() as u32;
-            self.clusters.push(Cluster {
-                first,
-                cameras: from_camera,
-                lights: draft.members.len() as u32 - from_camera,
-                area: draft.area,
-                class: draft.class,
-            });
         }
         true
+    }
+
+    /// Finds the clusters' areas. `exact`: whether light paths are sampled; without them areas cancel. Returns
+    /// `false` if it was stopped.
+    pub fn measure(&mut self, world: &World, grid: &Grid, all: Numbered, exact: bool, cut: &Cut) -> bool {
+        let order = &self.order;
+        self.clusters.par_iter_mut().with_min_len(GRAIN).for_each(|c| {
+            if !cut.is_raised() {
+                let members = &order[c.first as usize..][..(c.cameras + c.lights) as usize];
+                c.area = area(world, grid, all, members, c, exact) / c.parts as f32;
+            }
+        });
+        !cut.is_raised()
     }
 
     /// Memory, bytes.
@@ -143,60 +163,85 @@ impl Clusters {
     }
 }
 
-/// The clusters of what shares a key: one, or two where something stands between its points; each divided
-/// again where pairs would be too many.
-fn drafts(world: &World, grid: &Grid, all: Numbered, group: &[(u64, u32)], areas_count: bool) -> Vec<Draft> {
-    let representative = all.get(group[0].1);
-    let voxel = grid.voxel(representative.position);
-    let (_, edge) = grid.place(&voxel);
-    let hub = representative.position + representative.normal * (LIFT * edge);
-    let hidden = |p: Vec3, n: Vec3| !world.is_clear(p + n * (LIFT * edge), hub);
-    let (mut near, mut far) = (Vec::with_capacity(group.len()), Vec::new());
-    near.push(group[0].1);
-    for &(_, i) in &group[1..] {
-        let a = all.get(i);
-        if hidden(a.position, a.normal) { far.push(i) } else { near.push(i) }
-    }
-    let parted = !far.is_empty();
-    let cameras = all.camera.len() as u32;
-    let mut out = Vec::new();
-    for (members, is_far) in [(near, false), (far, true)] {
-        // members are in the order of their numbers
-        let Some(&last) = members.last() else { continue };
-        let cell = area::Cell { grid, voxel, representative, parted: parted.then_some(is_far) };
-        let mean = members.iter().map(|&i| all.get(i).position - representative.position).sum::<Vec3>();
-        let point = representative.position + mean / members.len() as f32;
-        let has_photons = last >= cameras && members.len() > 1;
-        let points = if has_photons { area::MANY_POINTS } else { area::FEW_POINTS };
-        let area = match areas_count {
-            // it cancels
-            false => cell.plane_cut(point),
-            true => cell
-                .on_one_triangle(world, members.iter().map(|&i| all.get(i)))
-                .unwrap_or_else(|| cell.coverage(world, point, points, &hidden)),
-        };
-        divide(members, area, representative.class, cameras, &mut out);
-    }
-    out
+/// The point from which it is asked whether a voxel is divided: above the first of its arrivals.
+struct Hub {
+    point: Vec3,
+    lift: f32,
 }
 
-/// Divides a cluster at random where its lobes are evaluated pair by pair. Each part has its share of the area,
-/// as if the surface had been cut into interleaved pieces.
-fn divide(members: Vec<u32>, area: f32, class: SurfaceClass, cameras: u32, out: &mut Vec<Draft>) {
-    let from_camera = members.iter().take_while(|&&i| i < cameras).count() as u32;
-    let from_lights = members.len() as u32 - from_camera;
-    let parts = from_camera.max(from_lights / 2).div_ceil(MOST_PAIRED);
-    if class == SurfaceClass::Diffuse || parts <= 1 {
-        out.push(Draft { members, area, class });
-        return;
+impl Hub {
+    fn new(grid: &Grid, representative: &Arrival) -> Self {
+        let (_, edge) = grid.place(&grid.voxel(representative.position));
+        let lift = LIFT * edge;
+        Self { point: representative.position + representative.normal * lift, lift }
     }
-    let first = out.len();
-    for _ in 0..parts {
-        out.push(Draft { members: Vec::new(), area: area / parts as f32, class });
+
+    fn is_hidden(&self, world: &World, p: Vec3, normal: Vec3) -> bool {
+        !world.is_clear(p + normal * self.lift, self.point)
     }
-    let salt = members[0];
-    for i in members {
-        out[first + (hash(salt, i) % parts) as usize].members.push(i);
+}
+
+/// The clusters as they are laid out one after the other.
+#[derive(Default)]
+struct Layout {
+    /// Number of the camera's arrivals.
+    cameras: u32,
+    order: Vec<u32>,
+    clusters: Vec<Cluster>,
+}
+
+impl Layout {
+    /// The clusters of what shares a key: one, or two where something stands between its points; each divided at
+    /// random where its lobes are evaluated pair by pair. Each such part has its share of the area, as if
+    /// the surface had been cut into interleaved pieces.
+    fn add(&mut self, group: &[(u64, u32)], hidden: &[bool], class: SurfaceClass) {
+        let representative = group[0].1;
+        let parted = hidden.contains(&true);
+        for far in [false, true] {
+            let members = || group.iter().zip(hidden).filter(|&(_, &h)| h == far).map(|(&(_, i), _)| i);
+            let total = members().count() as u32;
+            let from_camera = members().take_while(|&i| i < self.cameras).count() as u32;
+            let parts = match class {
+                SurfaceClass::Diffuse => 1,
+                SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+                    from_camera.max((total - from_camera) / 2).div_ceil(MOST_PAIRED).max(1)
+                }
+            };
+            for part in 0..parts {
+                let first = self.order.len();
+                self.order.extend(members().filter(|&i| hash(representative, i) % parts == part));
+                let taken = &self.order[first..];
+                if taken.is_empty() {
+                    continue;
+                }
+                let cameras = taken.iter().take_while(|&&i| i < self.cameras).count() as u32;
+                self.clusters.push(Cluster {
+                    first: first as u32,
+                    cameras,
+                    lights: taken.len() as u32 - cameras,
+                    area: 0.0,
+                    class,
+                    representative,
+                    parted: parted.then_some(far),
+                    parts,
+                });
+            }
+        }
     }
-    out.retain(|d| !d.members.is_empty());
+}
+
+/// Area of a cluster, before it is shared out among its parts.
+fn area(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &Cluster, exact: bool) -> f32 {
+    let representative = all.get(c.representative);
+    let cell = Cell { grid, voxel: grid.voxel(representative.position), representative, parted: c.parted };
+    let mean = members.iter().map(|&i| all.get(i).position - representative.position).sum::<Vec3>();
+    let point = representative.position + mean / members.len() as f32;
+    if !exact {
+        return cell.plane_cut(point);
+    }
+    let has_photons = c.lights > 0 && members.len() > 1;
+    let points = if has_photons { MANY_POINTS } else { FEW_POINTS };
+    let hub = Hub::new(grid, representative);
+    cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)))
+        .unwrap_or_else(|| cell.coverage(world, point, points, &|p, n| hub.is_hidden(world, p, n)))
 }
