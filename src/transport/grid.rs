@@ -106,7 +106,7 @@ mod tests {
     use crate::scene::Camera;
 
     fn sensor() -> Sensor {
-        Sensor::new(&Camera::from_json("c", "{}").unwrap(), 100, 100)
+        Sensor::new(&Camera::from_json("c", r#"{"window":[-1,1,-1,1]}"#).unwrap(), 100, 100)
     }
 
     fn points(n: u32) -> impl Iterator<Item = Vec3> {
