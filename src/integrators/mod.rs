@@ -6,7 +6,8 @@ pub mod segment;
 
 use crate::film::{Film, Filter, Rect};
 use crate::math::Sampler;
-use crate::shading::{Sensor, World};
+use crate::shading::{CameraRay, Sensor, World};
+use glam::Vec2;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -99,11 +100,16 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// Random numbers of sample `index` of a pixel of the full film. Even and odd samples are two independent
-    /// sequences, as the film's two halves must be.
-    pub fn pixel_sampler(&self, x: u32, y: u32, index: u32) -> Sampler {
-        let stream = y.wrapping_mul(1 << 16) ^ x;
-        Sampler::new(self.seed ^ ((index & 1) << 31), stream, index >> 1)
+    /// The camera ray of sample `index` of a pixel of the film, and the random numbers of the path that it begins.
+    /// Even and odd samples are two independent sequences, as the film's two halves must be.
+    pub fn camera_sample(&self, x: u32, y: u32, index: u32) -> (CameraRay, Sampler) {
+        let (full_x, full_y) = (x + self.crop.x, y + self.crop.y);
+        let stream = full_y.wrapping_mul(1 << 16) ^ full_x;
+        let mut sampler = Sampler::new(self.seed ^ ((index & 1) << 31), stream, index >> 1);
+        let centre = Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5);
+        let film = centre + self.filter.sample(sampler.next_2d());
+        let lens = if self.world.needs().depth_of_field { sampler.next_2d() } else { Vec2::ZERO };
+        (self.sensor.ray(film, lens), sampler)
     }
 }
 

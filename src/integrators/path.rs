@@ -11,7 +11,7 @@ use crate::shading::bsdf::{Bsdf, Walk};
 use crate::shading::emitters::Receiver;
 use crate::shading::lobes::Density;
 use crate::shading::{CameraRay, LightPoint, Piece, Shaded, SurfacePoint, World};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The path tracer.
@@ -51,10 +51,9 @@ fn render_tile(context: &Context, index: u32, shared: &SharedTile) -> bool {
             complete = false;
             break;
         }
-        let (full_x, full_y) = (x + context.crop.x, y + context.crop.y);
-        let sampler = context.pixel_sampler(full_x, full_y, index);
+        let (ray, sampler) = context.camera_sample(x, y, index);
         let mut walk = PathWalk { context, sampler, rays: 0 };
-        tile.add(x, y, &walk.sample(Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5)));
+        tile.add(x, y, &walk.sample(&ray));
         rays += walk.rays;
     }
     context.counters.rays.fetch_add(rays, Relaxed);
@@ -102,13 +101,10 @@ impl PathWalk<'_, '_> {
         self.context.world
     }
 
-    /// One sample of the pixel whose centre is at `centre`.
-    fn sample(&mut self, centre: Vec2) -> Sample {
-        let film = centre + self.context.filter.sample(self.sampler.next_2d());
-        let lens = if self.world().needs().depth_of_field { self.sampler.next_2d() } else { Vec2::ZERO };
-        let ray = self.context.sensor.ray(film, lens);
+    /// One sample of the pixel that a camera ray goes through.
+    fn sample(&mut self, ray: &CameraRay) -> Sample {
         let mut sample = Sample { alpha: 1.0, ..Sample::default() };
-        self.trace(&ray, &mut sample);
+        self.trace(ray, &mut sample);
         sample
     }
 

@@ -12,7 +12,7 @@ use crate::transport::propagate::Reflected;
 use crate::transport::store::{CameraStore, LightStore};
 use crate::transport::weigh::{Sampled, Weights};
 use crate::transport::{Cut, Techniques};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -129,13 +129,7 @@ impl Segment {
                     if cut.is_raised() {
                         break;
                     }
-                    let (full_x, full_y) = (x + crop.x, y + crop.y);
-                    let mut random = context.pixel_sampler(full_x, full_y, index);
-                    let centre = Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5);
-                    let film = centre + context.filter.sample(random.next_2d());
-                    let lens =
-                        if context.world.needs().depth_of_field { random.next_2d() } else { Vec2::ZERO };
-                    let ray = context.sensor.ray(film, lens);
+                    let (ray, mut random) = context.camera_sample(x, y, index);
                     primaries.push(sampler.path(&ray, &mut random, &mut store, &mut rays));
                 }
                 context.counters.rays.fetch_add(rays, Relaxed);

@@ -2,7 +2,7 @@
 
 use crate::film::{Filter, FilterKind, Pass, PassSet, Rect};
 use crate::transport::Techniques;
-use crate::transport::kernel::{Kernel, Shrinking};
+use crate::transport::kernel::{DEFAULT_ALPHA, Kernel, Shrinking};
 use serde::{Deserialize, Serialize};
 
 /// The integrators there are.
@@ -94,14 +94,15 @@ struct Json {
 
 impl Default for Json {
     fn default() -> Self {
+        let techniques = Techniques::default();
         Self {
             integrator: Method::default(),
             kernel: KernelName::default(),
-            kernel_size: 4.0,
-            kernel_alpha: 0.67,
-            light_paths: 0.25,
-            next_event: true,
-            camera_paths: true,
+            kernel_size: techniques.kernel.start,
+            kernel_alpha: DEFAULT_ALPHA,
+            light_paths: techniques.light_paths,
+            next_event: techniques.next_event,
+            camera_paths: techniques.camera_paths,
             resolution: [0, 0],
             crop: None,
             samples: 0,

@@ -266,23 +266,15 @@ impl CameraSampler<'_> {
             }
             false => 0.0,
         };
-        let next_event = match light.is_delta {
-            true => NextEvent {
-                direction: light.direction,
-                pdf,
-                light: arriving * cos,
-                next_event_pdf: light.pdf,
-                light_density: paths * cos,
-                is_delta: true,
-            },
-            false => NextEvent {
-                direction: light.direction,
-                pdf,
-                light: arriving,
-                next_event_pdf: light.pdf / cos,
-                light_density: paths,
-                is_delta: false,
-            },
+        // a delta light counts by area, others by étendue
+        let (light_cos, pdf_cos) = if light.is_delta { (cos, 1.0) } else { (1.0, cos) };
+        let next_event = NextEvent {
+            direction: light.direction,
+            pdf,
+            light: arriving * light_cos,
+            next_event_pdf: light.pdf / pdf_cos,
+            light_density: paths * light_cos,
+            is_delta: light.is_delta,
         };
         let sound = next_event.light.is_finite()
             && luminance(next_event.light) > 0.0

@@ -6,20 +6,22 @@
 //! with `m` of them reads what its end reflected `m` sweeps before.
 
 use super::Cut;
-use super::exchange::{emitted, gather, gather_photons, has_end, photon_values, segments};
+use super::exchange::{emitted, gather, gather_photons, has_end, per_index, photon_values, segments};
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
-/// Fewest arrivals that one task takes.
-const GRAIN: usize = 512;
-
 /// Reflected light of at most so many bounces, carried and of photons.
 struct Level {
     carried: Vec<Vec3>,
     photons: Vec<Vec3>,
+}
+
+/// The level that many sweeps before the last, if there was one.
+fn back(levels: &VecDeque<Level>, sweeps: u32) -> Option<&Level> {
+    levels.iter().rev().nth(sweeps as usize)
 }
 
 impl Reflected {
@@ -39,30 +41,18 @@ impl Reflected {
         let chains = s.camera.outgoing.iter().map(|o| o.passages).chain(first.iter().map(|f| f.1));
         let kept = 1 + chains.max().unwrap_or(0) as usize;
         let mut levels = VecDeque::from([Level { carried: nothing(), photons: nothing() }]);
-        // the level of at most `k` bounces, once the last one made is `last`
-        let at = |levels: &VecDeque<Level>, last: u32, k: u32| levels.len() - 1 - (last - k) as usize;
         self.direct = nothing();
         let (constants, values) = (segments(s, w), photon_values(s, w));
         for k in 1..=bounces {
             if cut.is_raised() {
                 return false;
             }
-            let brought: Vec<Vec3> = (0..n)
-                .into_par_iter()
-                .with_min_len(GRAIN)
-                .map(|i| {
-                    // light met after k passages has bounced once more on its way
-                    let met = emitted(s, w, i, Some(k - 1));
-                    match (k - 1).checked_sub(s.camera.outgoing[i].passages) {
-                        Some(level) if has_end(s, i) => {
-                            let Level { carried, photons } = &levels[at(&levels, k - 1, level)];
-                            let all = &constants[i];
-                            all.value(carried[i + 1], photons[i + 1]) - all.emitted + met
-                        }
-                        _ => met,
-                    }
-                })
-                .collect();
+            let brought = per_index(s, |i| {
+                // light met after k passages has bounced once more on its way
+                let met = emitted(s, w, i, Some(k - 1));
+                let level = back(&levels, s.camera.outgoing[i].passages).filter(|_| has_end(s, i));
+                constants[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1])))
+            });
             let photons = gather_photons(s, w, &values, cut, |p| p.bounces < k);
             let first_photons = if k == 1 { photons.clone() } else { Vec::new() };
             levels.push_back(Level { carried: gather(s, w, &brought, cut), photons });
@@ -77,8 +67,9 @@ impl Reflected {
         (self.carried, self.photons) = (nothing(), nothing());
         for &(arrival, passages) in first {
             let i = arrival as usize;
-            let level = &levels[at(&levels, bounces, bounces - passages)];
-            (self.carried[i], self.photons[i]) = (level.carried[i], level.photons[i]);
+            if let Some(level) = back(&levels, passages) {
+                (self.carried[i], self.photons[i]) = (level.carried[i], level.photons[i]);
+            }
         }
         true
     }

@@ -8,8 +8,8 @@ use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Fewest arrivals or clusters that one task takes.
-const GRAIN: usize = 512;
+/// Fewest arrivals or clusters, and number of paths, that one task takes.
+pub(super) const GRAIN: usize = 512;
 
 /// The constants of a camera segment, by the arrival it leaves.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,10 +25,14 @@ pub(super) struct Segment {
 }
 
 impl Segment {
-    /// What it brings, `value(s')`, if its end reflects so much, of carried light and of photons.
+    /// What it brings, `value(s')`, if it met so much light, and if its end, where it has one, reflects so much:
+    /// carried light and that of photons.
     #[inline]
-    pub fn value(&self, carried: Vec3, photons: Vec3) -> Vec3 {
-        self.emitted + self.carry * carried + self.carry_photons * photons
+    pub fn value(&self, emitted: Vec3, end: Option<(Vec3, Vec3)>) -> Vec3 {
+        match end {
+            Some((carried, photons)) => emitted + self.carry * carried + self.carry_photons * photons,
+            None => emitted,
+        }
     }
 }
 
@@ -88,7 +92,7 @@ pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
             ..constants
         }
     };
-    (0..s.camera.arrivals.len()).into_par_iter().with_min_len(GRAIN).map(one).collect()
+    per_index(s, one)
 }
 
 /// Flux over area of a photon, times its weight beside the other techniques.
@@ -170,6 +174,11 @@ pub(super) fn gather(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec
     })
 }
 
+/// Something for every camera arrival, by its index.
+pub(super) fn per_index<T: Send>(s: Sampled, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..s.camera.arrivals.len()).into_par_iter().with_min_len(GRAIN).map(f).collect()
+}
+
 /// Something for every diffuse cluster, zero for the others.
 fn per_diffuse_cluster(s: Sampled, cut: &Cut, f: impl Fn(&Cluster) -> Vec3 + Sync) -> Vec<Vec3> {
     let one = |c: &Cluster| match c.class == SurfaceClass::Diffuse && !cut.is_raised() {
@@ -188,5 +197,5 @@ fn per_arrival(s: Sampled, cut: &Cut, f: impl Fn(usize, usize, &Cluster) -> Vec3
         let k = s.clusters.of[i] as usize;
         f(i, k, &s.clusters.clusters[k])
     };
-    (0..s.camera.arrivals.len()).into_par_iter().with_min_len(GRAIN).map(one).collect()
+    per_index(s, one)
 }

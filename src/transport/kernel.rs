@@ -22,9 +22,12 @@ pub struct Kernel {
     pub shrinking: Shrinking,
 }
 
+/// The paper's rate of shrinking.
+pub const DEFAULT_ALPHA: f32 = 0.67;
+
 impl Default for Kernel {
     fn default() -> Self {
-        Self { start: 4.0, shrinking: Shrinking::Progressive { alpha: 0.67 } }
+        Self { start: 4.0, shrinking: Shrinking::Progressive { alpha: DEFAULT_ALPHA } }
     }
 }
 

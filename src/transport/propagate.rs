@@ -6,7 +6,9 @@
 //! the other photons there alone, since that one's presence is given.
 
 use super::Cut;
-use super::exchange::{Segment, emitted, gather, gather_photons, has_end, photon_values, segments};
+use super::exchange::{
+    GRAIN, Segment, emitted, gather, gather_photons, has_end, per_index, photon_values, segments,
+};
 use super::weigh::{Sampled, Weights};
 use crate::math::luminance;
 use crate::shading::SurfaceClass;
@@ -17,8 +19,6 @@ use rayon::prelude::*;
 const TOLERANCE: f64 = 1e-3;
 /// Fewest and most sweeps.
 const SWEEPS: [u32; 2] = [2, 32];
-/// Fewest arrivals, and number of paths, that one task takes.
-const GRAIN: usize = 512;
 
 /// Reflected basic radiance at the camera's arrivals, by index.
 #[derive(Debug, Default)]
@@ -36,7 +36,6 @@ impl Reflected {
     /// Solves for the radiance. `starts`: for every path, its first arrival. `wants_direct`: whether
     /// [`Reflected::direct`] is asked for. Returns `false` if it was stopped.
     pub fn solve(&mut self, s: Sampled, w: &Weights, starts: &[u32], wants_direct: bool, cut: &Cut) -> bool {
-        let n = s.camera.arrivals.len();
         self.segments = segments(s, w);
         let values = photon_values(s, w);
         self.photons = gather_photons(s, w, &values, cut, |_| true);
@@ -48,14 +47,11 @@ impl Reflected {
             if cut.is_raised() {
                 return false;
             }
-            let brought: Vec<Vec3> = (0..n)
-                .into_par_iter()
-                .with_min_len(GRAIN)
-                .map(|i| match has_end(s, i) {
-                    true => self.segments[i].value(self.carried[i + 1], self.photons[i + 1]),
-                    false => self.segments[i].emitted,
-                })
-                .collect();
+            let brought = per_index(s, |i| {
+                let segment = &self.segments[i];
+                let end = has_end(s, i).then(|| (self.carried[i + 1], self.photons[i + 1]));
+                segment.value(segment.emitted, end)
+            });
             self.carried = gather(s, w, &brought, cut);
             let now = mean(&self.carried);
             let change = (now - before).abs();
@@ -66,8 +62,7 @@ impl Reflected {
         }
         self.direct.clear();
         if wants_direct {
-            let straight: Vec<Vec3> =
-                (0..n).into_par_iter().with_min_len(GRAIN).map(|i| emitted(s, w, i, Some(0))).collect();
+            let straight = per_index(s, |i| emitted(s, w, i, Some(0)));
             let first = gather_photons(s, w, &values, cut, |p| p.bounces == 0);
             self.direct = gather(s, w, &straight, cut);
             self.direct.par_iter_mut().zip(first).for_each(|(d, p)| *d += p);
@@ -96,10 +91,8 @@ impl Reflected {
                 let mut light = w.direct[place];
                 if s.camera.arrivals[i].goes_on {
                     let segment = &self.segments[i];
-                    let brought = match has_end(s, i) {
-                        true => segment.value(tails[i + 1 - first], self.photons[i + 1]),
-                        false => segment.emitted,
-                    };
+                    let end = has_end(s, i).then(|| (tails[i + 1 - first], self.photons[i + 1]));
+                    let brought = segment.value(segment.emitted, end);
                     let cluster = s.clusters.of[i] as usize;
                     let c = &s.clusters.clusters[cluster];
                     let f = match c.class {

@@ -134,7 +134,7 @@ pub enum Rivals {
     },
 }
 
-/// The camera's side of an iteration. All but `hits` and `primaries` have one element for every arrival.
+/// The camera's side of an iteration. All but `hits` have one element for every arrival.
 #[derive(Debug, Default)]
 pub struct CameraStore {
     /// Ends of segments, path by path.

@@ -137,8 +137,7 @@ impl Follow<'_> {
             let u = if vertex.bsdf.has_delta() { sampler.next_3d() } else { Vec3::ZERO };
             match vertex.bsdf.event(wo, self.walk, u) {
                 Event::Absorbed => return (chain, None),
-                Event::Ends => {
-                    let end_probability = vertex.bsdf.end_probability(wo);
+                Event::Ends { probability: end_probability } => {
                     chain.forward *= end_probability;
                     return (chain, Some(End { hit, vertex, wo, opacity, end_probability }));
                 }

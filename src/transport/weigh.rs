@@ -72,11 +72,6 @@ impl<'a> Sampled<'a> {
         let (order, first) = (&self.clusters.order, self.camera.arrivals.len());
         c.light_places().map(move |k| order[k] as usize - first)
     }
-
-    /// Place in the order of the light arrival with index `j`.
-    pub fn light_place(&self, j: usize) -> usize {
-        self.clusters.place[self.camera.arrivals.len() + j] as usize
-    }
 }
 
 #[derive(Default)]

@@ -12,7 +12,10 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
     /// A continuous lobe was chosen: the segment ends here.
-    Ends,
+    Ends {
+        /// Probability of this choice, that of [`Bsdf::end_probability`].
+        probability: f32,
+    },
     /// A Dirac lobe was chosen: the segment goes on.
     Passes(Passage),
     /// The light is absorbed.
@@ -38,13 +41,13 @@ impl Bsdf {
     /// Chooses what happens to a walk that arrives from `from`. `u`: three uniform numbers of [0,1).
     pub fn event(&self, from: Vec3, walk: Walk, u: Vec3) -> Event {
         if !self.has_delta() {
-            return if self.is_black() { Event::Absorbed } else { Event::Ends };
+            return if self.is_black() { Event::Absorbed } else { Event::Ends { probability: 1.0 } };
         }
         let Some(side) = self.side_of(from) else { return Event::Absorbed };
         let choice = Choice::new(self, from, side);
         let (k, uz) = choice.pick(u.z);
         if !self.entries()[k].delta {
-            return Event::Ends;
+            return Event::Ends { probability: self.continuous_share(&choice) };
         }
         let Some(s) = self.sample_entry(&choice, k, from, side, walk, u.with_z(uz)) else {
             return Event::Absorbed;
@@ -63,9 +66,13 @@ impl Bsdf {
             return 1.0;
         }
         let Some(side) = self.side_of(from) else { return 0.0 };
-        let choice = Choice::new(self, from, side);
-        let continuous = |&(_, e): &(usize, &super::Entry)| !e.delta;
-        self.entries().iter().enumerate().filter(continuous).map(|(k, _)| choice.probability(k)).sum()
+        self.continuous_share(&Choice::new(self, from, side))
+    }
+
+    /// Probability that a choice falls on a continuous lobe.
+    fn continuous_share(&self, choice: &Choice) -> f32 {
+        let continuous = self.entries().iter().enumerate().filter(|(_, e)| !e.delta);
+        continuous.map(|(k, _)| choice.probability(k)).sum()
     }
 
     /// Density with which [`Bsdf::sample_continuous`], standing on `from`, draws `to`.
