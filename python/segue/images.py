@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -141,6 +142,51 @@ def read_rgb(path: str) -> np.ndarray:
         file.close()
     pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
     return np.ascontiguousarray(pixels[:, :, [names.index(w) for w in wanted]])
+
+
+def read_attribute(path: str, name: str) -> Any:
+    """An entry of a picture's header, None where there is none.
+
+    Raises:
+        ImageError: the file is missing or broken.
+    """
+    oiio = _oiio()
+    file = oiio.ImageInput.open(str(path))
+    if file is None:
+        raise ImageError(oiio.geterror() or f"{path} cannot be opened")
+    try:
+        return file.spec().getattribute(name)
+    finally:
+        file.close()
+
+
+def write_exr(
+    path: Path, layers: Mapping[str, np.ndarray], attributes: Mapping[str, str | float]
+) -> None:
+    """Writes layers of one size, (h, w, 3) each, as 32-bit floats: `Combined.R` and so on.
+
+    The file takes its place when it is complete.
+
+    Raises:
+        ImageError: it cannot be written.
+    """
+    oiio = _oiio()
+    height, width, _ = next(iter(layers.values())).shape
+    spec = oiio.ImageSpec(width, height, 3 * len(layers), "float")
+    spec.channelnames = [f"{layer}.{c}" for layer in layers for c in "RGB"]
+    spec["compression"] = "zip"
+    for name, value in attributes.items():
+        spec[name] = value
+    pixels = np.concatenate([np.asarray(p, np.float32) for p in layers.values()], axis=2)
+    unfinished = path.with_name(f".{path.stem}.unfinished.exr")
+    file = oiio.ImageOutput.create(str(unfinished))
+    if file is None or not file.open(str(unfinished), spec):
+        raise ImageError(f"{path} cannot be written: {oiio.geterror()}")
+    written = file.write_image(np.ascontiguousarray(pixels))
+    if not (file.close() and written):
+        unfinished.unlink(missing_ok=True)
+        raise ImageError(f"{path} cannot be written: {file.geterror()}")
+    unfinished.replace(path)
 
 
 def write_png(path: Path, pixels: np.ndarray) -> None:

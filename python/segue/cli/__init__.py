@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from .. import __version__
-from . import compare, info, render
+from . import compare, converge, info, reference, render
 from .status import BAD_USAGE, Status, status_of
 
 
@@ -17,11 +17,12 @@ def build_parser() -> argparse.ArgumentParser:
         prog="segue",
         description="Physically based rendering of USD stages.",
         epilog="Exit status: 0 done, 1 the engine failed or a file could not be written, 2 bad "
-        "usage, 3 bad input, 130 cancelled (what was rendered so far is saved).",
+        "usage, 3 bad input, 4 a reference was not reached, 130 cancelled (what was rendered so "
+        "far is saved).",
     )
     parser.add_argument("--version", action="version", version=f"segue {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in (render, compare, info):
+    for command in (render, compare, converge, reference, info):
         command.add_parser(commands)
     return parser
 

@@ -16,6 +16,7 @@ class Status(IntEnum):
     FAILED = 1
     BAD_USAGE = 2
     BAD_INPUT = 3
+    REFUSED = 4
     CANCELLED = 130
 
 
