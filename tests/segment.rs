@@ -107,6 +107,42 @@ fn photons_do_not_count_themselves() {
     }
 }
 
+/// The recursion as written is too bright where photons are few, the more so the smaller the kernel; without light
+/// paths both estimators are the same, and with many photons in every cluster they meet.
+#[test]
+fn the_literal_recursion_has_the_bias_that_leaving_one_out_removes() {
+    let mut s =
+        corner(WALL, r#"{"surface":{"type":"principled","base_color":[0.7,0.6,0.5],"roughness":0.5}}"#);
+    s.light(RECT);
+    let reference = estimate(&s, 32, 256, Pass::Indirect, PATH);
+    let fixed = |size: f32, more: &str| {
+        let set = format!(
+            r#","integrator":"segment","next_event":false,"kernel":"fixed","kernel_size":{size}{more}"#
+        );
+        estimate(&s, 32, 64, Pass::Indirect, &set)
+    };
+    let mut biases = Vec::new();
+    for size in [2.0, 1.0, 0.3] {
+        let own = fixed(size, r#","light_paths":1"#);
+        let literal = fixed(size, r#","light_paths":1,"estimator":"literal""#);
+        println!(
+            "kernel of {size} pixels: leaving one out {:+.2} %, literal {:+.2} %",
+            100.0 * (own.0 / reference.0 - 1.0),
+            100.0 * (literal.0 / reference.0 - 1.0)
+        );
+        assert_agree(&format!("leaving one out, {size} pixels"), own, reference, 1e-2);
+        biases.push(literal.0 / reference.0 - 1.0);
+    }
+    assert!(biases[0] < biases[1] && biases[1] < biases[2], "{biases:?}");
+    assert!(biases[2] > 0.03, "{biases:?}");
+    let many = fixed(16.0, r#","light_paths":4"#);
+    let many_literal = fixed(16.0, r#","light_paths":4,"estimator":"literal""#);
+    assert_agree("many photons", many_literal, many, 1e-2);
+    let none = r#","light_paths":0,"max_depth":3"#;
+    let alike = (fixed(1.0, none).0, fixed(1.0, &format!(r#"{none},"estimator":"literal""#)).0);
+    assert!((alike.0 / alike.1 - 1.0).abs() < 1e-5, "{alike:?}");
+}
+
 #[test]
 fn glossy_and_layered_surfaces_agree() {
     let layered =

@@ -7,6 +7,7 @@ pub mod segment;
 use crate::film::{Film, Filter, Rect};
 use crate::math::Sampler;
 use crate::shading::{CameraRay, Sensor, World};
+use crate::transport::report::Report;
 use glam::Vec2;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
@@ -42,6 +43,10 @@ pub struct Counters {
     pub rays: AtomicU64,
     /// Segments of the last iteration, where there are any.
     pub segments: AtomicU64,
+    /// Contributions of segments that were not finite and were dropped.
+    pub dropped: AtomicU64,
+    /// The graph of the segment method, from the last iteration in which it was looked at.
+    pub graph: Mutex<Option<Report>>,
     /// Seconds spent in each stage, and the bytes that it holds.
     pub stages: Mutex<BTreeMap<&'static str, (f64, u64)>>,
 }

@@ -9,11 +9,13 @@ use crate::transport::cluster::{Clusters, Numbered};
 use crate::transport::grid::Grid;
 use crate::transport::light::LightSampler;
 use crate::transport::propagate::Reflected;
+use crate::transport::report::report;
 use crate::transport::store::{CameraStore, LightStore};
 use crate::transport::weigh::{Sampled, Weights};
-use crate::transport::{Cut, Techniques};
+use crate::transport::{Cut, Estimator, Techniques};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::sync::PoisonError;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// Light paths that one task samples.
@@ -92,21 +94,32 @@ impl Segment {
         context.counters.segments.store(self.segments() as u64, Relaxed);
 
         let sampled = Sampled { world, camera: &self.camera, light: &self.light, clusters: &self.clusters };
-        if !self.weights.weigh(sampled, cut) {
+        if !self.weights.weigh(sampled, self.techniques.estimator, cut) {
             return false;
         }
         costs.stage("weights", self.weights.bytes());
         let passes = context.film.passes();
         let wants_direct = passes.contains(Pass::Direct) || passes.contains(Pass::Indirect);
-        let solved = match context.max_depth {
-            None => self.reflected.solve(sampled, &self.weights, &self.starts, wants_direct, cut),
-            Some(bounces) => {
-                let first = self.primaries.iter().filter_map(|p| Some((p.arrival?, p.passages)));
-                let first: Vec<_> = first.filter(|&(_, passages)| passages < bounces).collect();
-                self.reflected.solve_limited(sampled, &self.weights, &first, bounces, cut)
-            }
+        let first = || {
+            let first = self.primaries.iter().filter_map(|p| Some((p.arrival?, p.passages)));
+            first
+                .filter(|&(_, passages)| context.max_depth.is_none_or(|most| passages < most))
+                .collect::<Vec<_>>()
+        };
+        let (weights, reflected) = (&self.weights, &mut self.reflected);
+        let solved = match (self.techniques.estimator, context.max_depth) {
+            (Estimator::Literal, limit) => reflected.solve_literal(sampled, weights, &first(), limit, cut),
+            (_, None) => reflected.solve(sampled, weights, &self.starts, wants_direct, cut),
+            (_, Some(limit)) => reflected.solve_limited(sampled, weights, &first(), limit, cut),
         };
         costs.stage("propagation", self.reflected.bytes());
+        context.counters.dropped.fetch_add(self.camera.dropped, Relaxed);
+        // figures that hardly change are taken ever more rarely
+        if solved && (index + 1).is_power_of_two() {
+            let report = report(sampled, &self.weights, cut);
+            *context.counters.graph.lock().unwrap_or_else(PoisonError::into_inner) = Some(report);
+            costs.stage("report", 0);
+        }
         solved
     }
 
@@ -158,6 +171,7 @@ impl Segment {
             world: context.world,
             paths: paths as f32,
             next_event: self.techniques.next_event,
+            estimator: self.techniques.estimator,
         };
         let batches: Vec<LightStore> = (0..paths.div_ceil(LIGHT_BATCH))
             .into_par_iter()
@@ -194,7 +208,7 @@ impl Segment {
                 Some(a) => {
                     let direct = self.reflected.direct.get(a).filter(|_| p.passages == 0);
                     (
-                        self.reflected.carried[a] + self.reflected.photons[a],
+                        self.reflected.carried[a] + self.reflected.photons[a].reflected,
                         direct.copied().unwrap_or(Vec3::ZERO),
                     )
                 }

@@ -358,6 +358,8 @@ impl Session {
             bytes_per_segment: held as f64 / segments.max(1) as f64,
             peak_memory_bytes: clock::peak_memory_bytes(),
             non_finite: self.film.rejected_samples(),
+            dropped: self.counters.dropped.load(Relaxed),
+            graph: locked(&self.counters.graph).clone(),
             estimated_error: state.estimated_error,
             threads: self.pool.current_num_threads(),
             seed: self.settings.seed,

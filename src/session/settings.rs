@@ -1,8 +1,8 @@
 //! What is asked of a render.
 
 use crate::film::{Filter, FilterKind, Pass, PassSet, Rect};
-use crate::transport::Techniques;
 use crate::transport::kernel::{DEFAULT_ALPHA, Kernel, Shrinking};
+use crate::transport::{Estimator, Techniques};
 use serde::{Deserialize, Serialize};
 
 /// The integrators there are.
@@ -23,6 +23,15 @@ enum KernelName {
     Fixed,
     #[default]
     Progressive,
+}
+
+/// How the light segments of the segment method are used.
+#[derive(Clone, Copy, Debug, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+enum EstimatorName {
+    #[default]
+    LeaveOneOut,
+    Literal,
 }
 
 /// Validated settings of a render.
@@ -71,6 +80,7 @@ pub struct Limits {
 #[serde(deny_unknown_fields, default)]
 struct Json {
     integrator: Method,
+    estimator: EstimatorName,
     kernel: KernelName,
     kernel_size: f32,
     kernel_alpha: f32,
@@ -97,6 +107,7 @@ impl Default for Json {
         let techniques = Techniques::default();
         Self {
             integrator: Method::default(),
+            estimator: EstimatorName::default(),
             kernel: KernelName::default(),
             kernel_size: techniques.kernel.start,
             kernel_alpha: DEFAULT_ALPHA,
@@ -128,6 +139,10 @@ impl Json {
         };
         let alpha = within("kernel_alpha", self.kernel_alpha, 0.01, 0.99)?;
         let techniques = Techniques {
+            estimator: match self.estimator {
+                EstimatorName::LeaveOneOut => Estimator::LeaveOneOut,
+                EstimatorName::Literal => Estimator::Literal,
+            },
             kernel: Kernel {
                 start: within("kernel_size", self.kernel_size, 1e-3, 1e3)?,
                 shrinking: match self.kernel {

@@ -1,5 +1,6 @@
 //! Figures of a render, as they go into the log, the file's header and to whoever asks.
 
+use crate::transport::report::Report;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -55,6 +56,8 @@ pub struct Statistics {
     pub bytes_per_segment: f64,
     pub peak_memory_bytes: u64,
     pub non_finite: u64,
+    pub dropped: u64,
+    pub graph: Option<Report>,
     pub estimated_error: Option<f64>,
     pub threads: usize,
     pub seed: u32,

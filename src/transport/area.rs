@@ -4,12 +4,14 @@ use super::grid::{Grid, Voxel};
 use super::store::Arrival;
 use crate::math::sampler::{hash, hash_unit};
 use crate::shading::{SurfaceClass, World};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-/// Coverage points along each of two axes, where photons are divided by the area.
-pub const MANY_POINTS: u32 = 4;
+/// Coverage points that have to lie on the cluster, where photons are divided by its area.
+pub const MANY_POINTS: u32 = 16;
 /// The same where the area only decides how much each technique counts.
 pub const FEW_POINTS: u32 = 2;
+/// Most points that are tried to find them.
+const MOST_TRIES: u32 = 256;
 /// Most surfaces that are looked at below one coverage point.
 const LAYERS: u32 = 64;
 
@@ -58,14 +60,16 @@ impl Cell<'_> {
         plane_cut_corners(point, n).into_iter().all(belongs).then(|| edge * edge * unit_plane_cut(point, n))
     }
 
-    /// Stratified estimate: rays through the voxel, along the axis nearest to the normal, meet what of the
-    /// surface belongs to the cluster. `points`: along each of two axes. `hidden`: whether a point with its normal is out of the
-    /// representative's sight.
+    /// Estimate by rays through the voxel, along the axis nearest to the normal, which meet what of the surface belongs
+    /// to the cluster. Photons are divided by the area, so it is the reciprocal that has to be right on average:
+    /// independent points are tried until `wanted` of them lie on the cluster (inverse binomial sampling, Haldane
+    /// 1945). `hidden`:
+    /// whether a point with its normal is out of the representative's sight.
     pub fn coverage(
         &self,
         world: &World,
         point: Vec3,
-        points: u32,
+        wanted: u32,
         hidden: &impl Fn(Vec3, Vec3) -> bool,
     ) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
@@ -74,22 +78,20 @@ impl Cell<'_> {
         let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
         let bin = self.grid.bin(n);
         let seed = hash(point.x.to_bits(), hash(point.y.to_bits(), point.z.to_bits()));
-        let mut sum = 0.0;
-        for k in 0..points * points {
-            let u = (k % points) as f32 + hash_unit(seed, 2 * k);
-            let v = (k / points) as f32 + hash_unit(seed, 2 * k + 1);
+        let (mut sum, mut tries, mut found) = (0.0, 0, 0);
+        while tries < MOST_TRIES && found < wanted {
+            let u = Vec2::new(hash_unit(seed, 2 * tries), hash_unit(seed, 2 * tries + 1));
+            tries += 1;
             let mut top = low;
-            top[u_axis] += u * edge / points as f32;
-            top[v_axis] += v * edge / points as f32;
+            top[u_axis] += u.x * edge;
+            top[v_axis] += u.y * edge;
             let mut bottom = top;
             top[axis] += edge;
             if n[axis] < 0.0 {
                 std::mem::swap(&mut top, &mut bottom);
             }
-            let mut is_first = true;
+            let mut is_there = false;
             world.for_each_surface(top, bottom, LAYERS, |p| {
-                // what lies below another surface may be the inside of it
-                let looks = self.parted.is_some() || !std::mem::replace(&mut is_first, false);
                 let class = world.class(p.material);
                 let ns = match class == SurfaceClass::Transmitting || p.ns.dot(n) > 0.0 {
                     true => p.ns,
@@ -98,16 +100,17 @@ impl Cell<'_> {
                 let there = class == self.representative.class
                     && self.grid.bin(ns) == bin
                     && self.grid.voxel(p.place.position) == self.voxel
-                    && (!looks || hidden(p.place.position, ns) == self.parted.unwrap_or(false));
+                    && hidden(p.place.position, ns) == self.parted.unwrap_or(false);
                 if there {
+                    is_there = true;
                     // a surface seen edge-on would count without bound
                     sum += 1.0 / p.place.normal[axis].abs().max(0.05);
                 }
             });
+            found += u32::from(is_there);
         }
-        let face = edge * edge / (points * points) as f32;
         // the cluster has arrivals, so it is somewhere between the points
-        sum.max(0.5) * face
+        sum.max(0.5) / tries as f32 * edge * edge
     }
 }
 

@@ -4,7 +4,7 @@ use super::arrival::arrival;
 use super::store::{CameraStore, EmissionHit, NextEvent, Outgoing};
 use super::walk::{Chain, End, Follow, Witness};
 use crate::film::FirstHit;
-use crate::math::{Sampler, luminance};
+use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
 use crate::shading::emitters::Receiver;
 use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
@@ -115,6 +115,7 @@ impl Witness for Seeing<'_> {
 struct Meeting<'a> {
     world: &'a World,
     hits: &'a mut Vec<EmissionHit>,
+    dropped: &'a mut u64,
     arrival: u32,
     receiver: Receiver,
     /// Cosine of the direction in which it left.
@@ -131,6 +132,7 @@ impl Meeting<'_> {
         let squeeze = 1.0 / (chain.index * chain.index);
         let light = chain.throughput * radiance * (self.inverse_n2 * squeeze);
         if !light.is_finite() {
+            *self.dropped += 1;
             return;
         }
         self.hits.push(EmissionHit {
@@ -189,7 +191,9 @@ impl CameraSampler<'_> {
                 true => self.next_event(&end, &receiver, inverse_n2, sampler, rays),
                 false => NextEvent::default(),
             };
-            store.next_events.push(next_event);
+            let sound = next_event.light.is_finite() && next_event.next_event_pdf.is_finite();
+            store.dropped += u64::from(!sound);
+            store.next_events.push(if sound { next_event } else { NextEvent::default() });
             store.inverse_n2.push(inverse_n2);
             let bsdf = &end.vertex.bsdf;
             let u = sampler.next_3d();
@@ -207,6 +211,7 @@ impl CameraSampler<'_> {
             let mut meeting = Meeting {
                 world: self.world,
                 hits: &mut store.hits,
+                dropped: &mut store.dropped,
                 arrival: index as u32,
                 receiver,
                 cos: end.hit.place.normal.dot(direction).abs(),
@@ -254,7 +259,7 @@ impl CameraSampler<'_> {
             return NextEvent::default();
         }
         let visible = self.world.transmittance(&end.hit, &light, rays);
-        if visible == Vec3::ZERO {
+        if visible == Vec3::ZERO || light.radiance == Vec3::ZERO {
             return NextEvent::default();
         }
         let index = bsdf.relative_index(end.wo, light.direction);
@@ -268,17 +273,13 @@ impl CameraSampler<'_> {
         };
         // a delta light counts by area, others by étendue
         let (light_cos, pdf_cos) = if light.is_delta { (cos, 1.0) } else { (1.0, cos) };
-        let next_event = NextEvent {
+        NextEvent {
             direction: light.direction,
             pdf,
             light: arriving * light_cos,
             next_event_pdf: light.pdf / pdf_cos,
             light_density: paths * light_cos,
             is_delta: light.is_delta,
-        };
-        let sound = next_event.light.is_finite()
-            && luminance(next_event.light) > 0.0
-            && next_event.next_event_pdf.is_finite();
-        if sound { next_event } else { NextEvent::default() }
+        }
     }
 }

@@ -6,7 +6,9 @@
 //! with `m` of them reads what its end reflected `m` sweeps before.
 
 use super::Cut;
-use super::exchange::{emitted, gather, gather_photons, has_end, per_index, photon_values, segments};
+use super::exchange::{
+    FromPhotons, emitted, gather, gather_photons, has_end, per_index, photon_values, segments,
+};
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use glam::Vec3;
@@ -16,12 +18,17 @@ use std::collections::VecDeque;
 /// Reflected light of at most so many bounces, carried and of photons.
 struct Level {
     carried: Vec<Vec3>,
-    photons: Vec<Vec3>,
+    photons: Vec<FromPhotons>,
 }
 
 /// The level that many sweeps before the last, if there was one.
 fn back(levels: &VecDeque<Level>, sweeps: u32) -> Option<&Level> {
     levels.iter().rev().nth(sweeps as usize)
+}
+
+/// Most passages of a segment of the camera's paths; `first` as in [`Reflected::solve_limited`].
+pub(super) fn longest_chain(s: Sampled, first: &[(u32, u32)]) -> u32 {
+    s.camera.outgoing.iter().map(|o| o.passages).chain(first.iter().map(|f| f.1)).max().unwrap_or(0)
 }
 
 impl Reflected {
@@ -38,9 +45,9 @@ impl Reflected {
         let n = s.camera.arrivals.len();
         let nothing = || vec![Vec3::ZERO; n];
         // as far back as the longest chain reads
-        let chains = s.camera.outgoing.iter().map(|o| o.passages).chain(first.iter().map(|f| f.1));
-        let kept = 1 + chains.max().unwrap_or(0) as usize;
-        let mut levels = VecDeque::from([Level { carried: nothing(), photons: nothing() }]);
+        let kept = 1 + longest_chain(s, first) as usize;
+        let mut levels =
+            VecDeque::from([Level { carried: nothing(), photons: vec![FromPhotons::default(); n] }]);
         self.direct = nothing();
         let (constants, values) = (segments(s, w), photon_values(s, w));
         for k in 1..=bounces {
@@ -51,9 +58,9 @@ impl Reflected {
                 // light met after k passages has bounced once more on its way
                 let met = emitted(s, w, i, Some(k - 1));
                 let level = back(&levels, s.camera.outgoing[i].passages).filter(|_| has_end(s, i));
-                constants[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1])))
+                constants[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1].brought)))
             });
-            let photons = gather_photons(s, w, &values, cut, |p| p.bounces < k);
+            let photons = gather_photons(s, w, &constants, &values, cut, |p| p.bounces < k);
             let first_photons = if k == 1 { photons.clone() } else { Vec::new() };
             levels.push_back(Level { carried: gather(s, w, &brought, cut), photons });
             if levels.len() > kept {
@@ -61,10 +68,10 @@ impl Reflected {
             }
             if k == 1 {
                 self.direct.clone_from(&levels[levels.len() - 1].carried);
-                self.direct.par_iter_mut().zip(first_photons).for_each(|(d, p)| *d += p);
+                self.direct.par_iter_mut().zip(first_photons).for_each(|(d, p)| *d += p.reflected);
             }
         }
-        (self.carried, self.photons) = (nothing(), nothing());
+        (self.carried, self.photons) = (nothing(), vec![FromPhotons::default(); n]);
         for &(arrival, passages) in first {
             let i = arrival as usize;
             if let Some(level) = back(&levels, passages) {

@@ -17,27 +17,39 @@ pub(super) struct Segment {
     /// Emitted light that it met, weighed: `E / D_E`.
     pub emitted: Vec3,
     /// Factor on what its end reflects: `T / D_R`.
-    carry: Vec3,
-    /// The same without one photon at the end: `T / D_R^-`.
-    carry_photons: Vec3,
+    pub carry: Vec3,
+    /// Density of the camera's techniques: `c P_cam / A_x`.
+    camera: f32,
+    /// Factor on `P_light` that makes it the density of the light's techniques: `c / (A_y n_rel^2)`.
+    light: f32,
     /// Own-path continuation: `P_cam / (q p)`.
     pub continuation: f32,
 }
 
 impl Segment {
-    /// What it brings, `value(s')`, if it met so much light, and if its end, where it has one, reflects so much:
-    /// carried light and that of photons.
+    /// What it brings, `value(s')`, if it met so much light, and if its end, where it has one, reflects so much
+    /// carried light and has photons that bring so much.
     #[inline]
     pub fn value(&self, emitted: Vec3, end: Option<(Vec3, Vec3)>) -> Vec3 {
         match end {
-            Some((carried, photons)) => emitted + self.carry * carried + self.carry_photons * photons,
+            Some((carried, brought)) => emitted + self.carry * carried + brought,
             None => emitted,
         }
     }
 }
 
+/// Light of the photons in the cluster of a camera arrival.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FromPhotons {
+    /// What the arrival reflects of it.
+    pub reflected: Vec3,
+    /// What the segment that arrived there brings of it: each photon's part over the density of all techniques
+    /// but that photon, `R_p / D_R^-`.
+    pub brought: Vec3,
+}
+
 /// One over a density; zero where there is none, or so little that nothing can have come of it.
-fn reciprocal(density: f32) -> f32 {
+pub(super) fn reciprocal(density: f32) -> f32 {
     let r = 1.0 / density;
     if density > 0.0 && r.is_finite() { r } else { 0.0 }
 }
@@ -52,7 +64,7 @@ pub(super) fn has_end(s: Sampled, i: usize) -> bool {
 /// Dirac lobes up to which light counts.
 pub(super) fn emitted(s: Sampled, w: &Weights, i: usize, most: Option<u32>) -> Vec3 {
     let hits = &s.camera.hits;
-    let here = &s.clusters.clusters[s.clusters.of[i] as usize];
+    let here = s.cluster_of(i);
     let camera = w.densities[s.clusters.place[i] as usize].camera / here.area;
     let first = hits.partition_point(|h| (h.arrival as usize) < i);
     let own = hits[first..].iter().take_while(|h| h.arrival as usize == i);
@@ -71,7 +83,7 @@ pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
         if !a.goes_on {
             return Segment::default();
         }
-        let here = &s.clusters.clusters[s.clusters.of[i] as usize];
+        let here = s.cluster_of(i);
         let p_camera = w.densities[s.clusters.place[i] as usize].camera;
         let constants = Segment {
             emitted: emitted(s, w, i, None),
@@ -81,27 +93,19 @@ pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
         if !has_end(s, i) {
             return constants;
         }
-        let end = &s.clusters.clusters[s.clusters.of[i + 1] as usize];
+        let end = s.cluster_of(i + 1);
         let p_light = w.densities[s.clusters.place[i + 1] as usize].light;
         let camera = out.forward * p_camera / here.area;
-        let light = out.reverse * out.squeeze * p_light / end.area;
-        let others = if end.lights > 0 { 1.0 - 1.0 / end.lights as f32 } else { 0.0 };
-        Segment {
-            carry: out.throughput * reciprocal(camera + light),
-            carry_photons: out.throughput * reciprocal(camera + light * others),
-            ..constants
-        }
+        let light = out.reverse * out.squeeze / end.area;
+        Segment { carry: out.throughput * reciprocal(camera + light * p_light), camera, light, ..constants }
     };
     per_index(s, one)
 }
 
 /// Flux over area of a photon, times its weight beside the other techniques.
-fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
+pub(super) fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
     let i = s.camera.arrivals.len() + j;
-    let c = &s.clusters.clusters[s.clusters.of[i] as usize];
-    if c.cameras == 0 {
-        return Vec3::ZERO;
-    }
+    let c = s.cluster_of(i);
     let photon = &s.light.photons[j];
     let camera = photon.camera_choices * w.densities[s.clusters.place[i] as usize].camera / c.area;
     let (own, others) = match photon.rivals {
@@ -112,7 +116,7 @@ fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
             (light_density, if others.is_nan() { f32::INFINITY } else { others })
         }
         Rivals::Later { light_choices, squeeze } => {
-            let before = &s.clusters.clusters[s.clusters.of[i - 1] as usize];
+            let before = s.cluster_of(i - 1);
             let p_light = w.densities[s.clusters.place[i - 1] as usize].light;
             (light_choices * squeeze * p_light / before.area, camera)
         }
@@ -122,35 +126,61 @@ fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
     photon.flux * (weight / c.area)
 }
 
-/// What every photon brings to its cluster.
+/// What every photon brings to its cluster; nothing where no camera path arrives.
 pub(super) fn photon_values(s: Sampled, w: &Weights) -> Vec<Vec3> {
     let n = s.light.arrivals.len();
-    (0..n).into_par_iter().with_min_len(GRAIN).map(|j| photon_value(s, w, j)).collect()
+    let one = |j: usize| match s.cluster_of(s.camera.arrivals.len() + j).cameras {
+        0 => Vec3::ZERO,
+        _ => photon_value(s, w, j),
+    };
+    (0..n).into_par_iter().with_min_len(GRAIN).map(one).collect()
 }
 
-/// Reflected light of the photons in every camera arrival's cluster that are `wanted`.
+/// Light of the photons in every camera arrival's cluster that are `wanted`.
 pub(super) fn gather_photons(
     s: Sampled,
     w: &Weights,
+    segments: &[Segment],
     values: &[Vec3],
     cut: &Cut,
     wanted: impl Fn(&Photon) -> bool + Sync,
-) -> Vec<Vec3> {
+) -> Vec<FromPhotons> {
     let light = |j: usize| if wanted(&s.light.photons[j]) { values[j] } else { Vec3::ZERO };
     let shared = per_diffuse_cluster(s, cut, |c| {
         let arriving = s.lights(c).map(|j| (light(j) * s.light.arrivals[j].back_pdf).as_dvec3());
         arriving.sum::<DVec3>().as_vec3()
     });
     per_arrival(s, cut, |i, k, c| {
-        let reflected = match c.class {
-            SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * shared[k],
-            SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let row = s.clusters.place[i] - c.first;
-                let f = &w.row(k, row as usize)[c.cameras as usize..];
-                f.iter().zip(s.lights(c)).map(|(f, j)| *f * light(j)).sum::<Vec3>()
-            }
+        if c.lights == 0 {
+            return FromPhotons::default();
+        }
+        let place = s.clusters.place[i];
+        let p_light = w.densities[place as usize].light;
+        let before = i.checked_sub(1).filter(|&b| has_end(s, b));
+        let arriving = before.map(|b| (&segments[b], s.camera.outgoing[b].throughput));
+        // factor on light of a photon whose own part of `P_light` is `own`
+        let carry = |own: f32| match arriving {
+            Some((a, throughput)) => throughput * reciprocal(a.camera + a.light * (p_light - own).max(0.0)),
+            None => Vec3::ZERO,
         };
-        reflected * s.camera.inverse_n2[i]
+        let mut sum = FromPhotons::default();
+        match c.class {
+            SurfaceClass::Diffuse => {
+                sum.reflected = s.camera.arrivals[i].reflectance * shared[k];
+                sum.brought = carry(p_light / c.lights as f32) * sum.reflected;
+            }
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+                let row = (place - c.first) as usize;
+                let f = &w.row(k, row)[c.cameras as usize..];
+                for ((f, own), j) in f.iter().zip(w.own(k, row)).zip(s.lights(c)) {
+                    let reflected = *f * light(j);
+                    sum.reflected += reflected;
+                    sum.brought += carry(*own) * reflected;
+                }
+            }
+        }
+        let inverse_n2 = s.camera.inverse_n2[i];
+        FromPhotons { reflected: sum.reflected * inverse_n2, brought: sum.brought * inverse_n2 }
     })
 }
 
@@ -180,7 +210,7 @@ pub(super) fn per_index<T: Send>(s: Sampled, f: impl Fn(usize) -> T + Sync + Sen
 }
 
 /// Something for every diffuse cluster, zero for the others.
-fn per_diffuse_cluster(s: Sampled, cut: &Cut, f: impl Fn(&Cluster) -> Vec3 + Sync) -> Vec<Vec3> {
+pub(super) fn per_diffuse_cluster(s: Sampled, cut: &Cut, f: impl Fn(&Cluster) -> Vec3 + Sync) -> Vec<Vec3> {
     let one = |c: &Cluster| match c.class == SurfaceClass::Diffuse && !cut.is_raised() {
         true => f(c),
         false => Vec3::ZERO,
@@ -189,10 +219,14 @@ fn per_diffuse_cluster(s: Sampled, cut: &Cut, f: impl Fn(&Cluster) -> Vec3 + Syn
 }
 
 /// Something for every camera arrival, by its index, that of its cluster and the cluster.
-fn per_arrival(s: Sampled, cut: &Cut, f: impl Fn(usize, usize, &Cluster) -> Vec3 + Sync) -> Vec<Vec3> {
+pub(super) fn per_arrival<T: Default + Send>(
+    s: Sampled,
+    cut: &Cut,
+    f: impl Fn(usize, usize, &Cluster) -> T + Sync,
+) -> Vec<T> {
     let one = |i: usize| {
         if cut.is_raised() {
-            return Vec3::ZERO;
+            return T::default();
         }
         let k = s.clusters.of[i] as usize;
         f(i, k, &s.clusters.clusters[k])

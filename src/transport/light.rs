@@ -1,7 +1,8 @@
 //! Sequential sampling from the lights.
 
+use super::Estimator;
 use super::arrival::arrival;
-use super::store::{LightStore, Photon, Rivals};
+use super::store::{Carry, LightStore, Photon, Rivals};
 use super::walk::{Chain, End, Follow, Nobody};
 use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
@@ -16,6 +17,8 @@ pub struct LightSampler<'a> {
     pub paths: f32,
     /// Whether camera arrivals sample next-event segments.
     pub next_event: bool,
+    /// What the arrivals are stored for.
+    pub estimator: Estimator,
 }
 
 impl LightSampler<'_> {
@@ -30,6 +33,7 @@ impl LightSampler<'_> {
         let mut rivals = self.first(&ray, &chain, &end);
         let mut camera_choices = chain.reverse;
         let mut bounces = chain.passages;
+        let mut carry = Carry { throughput: chain.throughput, inverse_n2: 1.0 / (chain.index * chain.index) };
         while flux.is_finite() && flux.max_element() > 0.0 {
             let mut arrived = arrival(self.world, &end);
             let u = sampler.next_3d();
@@ -38,6 +42,9 @@ impl LightSampler<'_> {
             let sample = if goes_on { bsdf.sample_continuous(end.wo, Walk::Light, u) } else { None };
             arrived.goes_on = sample.is_some();
             store.arrivals.push(arrived);
+            if self.estimator == Estimator::Literal {
+                store.carries.push(carry);
+            }
             let (direction, pdf) = sample.map_or((Vec3::ZERO, 0.0), |s| (s.direction, s.pdf.value()));
             // the camera segment that gathers it is as opaque at its end
             let flux_there = flux / end.opacity;
@@ -56,6 +63,8 @@ impl LightSampler<'_> {
             flux *= chain.throughput / chain.forward;
             rivals = Rivals::Later { light_choices: chain.forward, squeeze: chain.index * chain.index };
             camera_choices = chain.reverse * camera_end;
+            let index = sample.eta * chain.index;
+            carry = Carry { throughput: chain.throughput, inverse_n2: carry.inverse_n2 / (index * index) };
             bounces += 1 + chain.passages;
             end = next;
         }

@@ -10,7 +10,9 @@ mod exchange;
 pub mod grid;
 pub mod kernel;
 pub mod light;
+mod literal;
 pub mod propagate;
+pub mod report;
 pub mod store;
 pub mod walk;
 pub mod weigh;
@@ -27,9 +29,21 @@ impl Cut<'_> {
     }
 }
 
-/// Which segments are sampled, and how large the kernel is.
+/// How light segments take part in the propagation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Each carries the flux of its own path, and no photon counts itself: consistent.
+    #[default]
+    LeaveOneOut,
+    /// The paper's recursion as written: what a light segment brings is gathered where it came from.
+    Literal,
+}
+
+/// Which segments are sampled, how they are weighed, and how large the kernel is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Techniques {
+    /// The estimator.
+    pub estimator: Estimator,
     /// The kernel.
     pub kernel: kernel::Kernel,
     /// Light paths for each camera path; zero: none.
@@ -42,6 +56,12 @@ pub struct Techniques {
 
 impl Default for Techniques {
     fn default() -> Self {
-        Self { kernel: kernel::Kernel::default(), light_paths: 0.25, next_event: true, camera_paths: true }
+        Self {
+            estimator: Estimator::default(),
+            kernel: kernel::Kernel::default(),
+            light_paths: 0.25,
+            next_event: true,
+            camera_paths: true,
+        }
     }
 }

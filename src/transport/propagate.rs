@@ -7,7 +7,7 @@
 
 use super::Cut;
 use super::exchange::{
-    GRAIN, Segment, emitted, gather, gather_photons, has_end, per_index, photon_values, segments,
+    FromPhotons, GRAIN, Segment, emitted, gather, gather_photons, has_end, per_index, photon_values, segments,
 };
 use super::weigh::{Sampled, Weights};
 use crate::math::luminance;
@@ -26,7 +26,7 @@ pub struct Reflected {
     /// Of all light that was not gathered from photons there.
     pub carried: Vec<Vec3>,
     /// Of the photons that landed in the arrival's cluster.
-    pub photons: Vec<Vec3>,
+    pub photons: Vec<FromPhotons>,
     /// Of light that was scattered nowhere else; empty if nobody asked.
     pub direct: Vec<Vec3>,
     segments: Vec<Segment>,
@@ -38,10 +38,11 @@ impl Reflected {
     pub fn solve(&mut self, s: Sampled, w: &Weights, starts: &[u32], wants_direct: bool, cut: &Cut) -> bool {
         self.segments = segments(s, w);
         let values = photon_values(s, w);
-        self.photons = gather_photons(s, w, &values, cut, |_| true);
+        self.photons = gather_photons(s, w, &self.segments, &values, cut, |_| true);
         self.carried = self.own_tails(s, w, starts, cut);
         let mean = |v: &[Vec3]| starts.iter().map(|&i| f64::from(luminance(v[i as usize]))).sum::<f64>();
-        let constant = mean(&self.photons);
+        let constant =
+            starts.iter().map(|&i| f64::from(luminance(self.photons[i as usize].reflected))).sum::<f64>();
         let mut before = mean(&self.carried);
         for sweep in 1..=SWEEPS[1] {
             if cut.is_raised() {
@@ -49,7 +50,7 @@ impl Reflected {
             }
             let brought = per_index(s, |i| {
                 let segment = &self.segments[i];
-                let end = has_end(s, i).then(|| (self.carried[i + 1], self.photons[i + 1]));
+                let end = has_end(s, i).then(|| (self.carried[i + 1], self.photons[i + 1].brought));
                 segment.value(segment.emitted, end)
             });
             self.carried = gather(s, w, &brought, cut);
@@ -63,17 +64,19 @@ impl Reflected {
         self.direct.clear();
         if wants_direct {
             let straight = per_index(s, |i| emitted(s, w, i, Some(0)));
-            let first = gather_photons(s, w, &values, cut, |p| p.bounces == 0);
+            let first = gather_photons(s, w, &self.segments, &values, cut, |p| p.bounces == 0);
             self.direct = gather(s, w, &straight, cut);
-            self.direct.par_iter_mut().zip(first).for_each(|(d, p)| *d += p);
+            self.direct.par_iter_mut().zip(first).for_each(|(d, p)| *d += p.reflected);
         }
         !cut.is_raised()
     }
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        let vectors = self.carried.capacity() + self.photons.capacity() + self.direct.capacity();
-        vectors * size_of::<Vec3>() + self.segments.capacity() * size_of::<Segment>()
+        let vectors = self.carried.capacity() + self.direct.capacity();
+        vectors * size_of::<Vec3>()
+            + self.photons.capacity() * size_of::<FromPhotons>()
+            + self.segments.capacity() * size_of::<Segment>()
     }
 
     /// What every path's own tail says of the light it carries, from its end backwards.
@@ -91,7 +94,7 @@ impl Reflected {
                 let mut light = w.direct[place];
                 if s.camera.arrivals[i].goes_on {
                     let segment = &self.segments[i];
-                    let end = has_end(s, i).then(|| (tails[i + 1 - first], self.photons[i + 1]));
+                    let end = has_end(s, i).then(|| (tails[i + 1 - first], self.photons[i + 1].brought));
                     let brought = segment.value(segment.emitted, end);
                     let cluster = s.clusters.of[i] as usize;
                     let c = &s.clusters.clusters[cluster];

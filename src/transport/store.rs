@@ -39,7 +39,12 @@ pub struct Arrival {
 impl Arrival {
     /// The scattering there, computed anew.
     pub fn bsdf(&self, world: &World) -> Bsdf {
-        world.bsdf(&world.surface(self.instance, self.triangle, self.barycentrics), self.wo)
+        self.bsdf_from(world, self.wo)
+    }
+
+    /// The same, looked at from elsewhere.
+    pub fn bsdf_from(&self, world: &World, wo: Vec3) -> Bsdf {
+        world.bsdf(&world.surface(self.instance, self.triangle, self.barycentrics), wo)
     }
 }
 
@@ -134,6 +139,15 @@ pub enum Rivals {
     },
 }
 
+/// What the literal recursion alone needs to know of an arrival of a light path.
+#[derive(Clone, Copy, Debug)]
+pub struct Carry {
+    /// Throughput of the chain that ends there.
+    pub throughput: Vec3,
+    /// `1 / n^2` on the side arrived from, if the light stands in a medium of index one.
+    pub inverse_n2: f32,
+}
+
 /// The camera's side of an iteration. All but `hits` have one element for every arrival.
 #[derive(Debug, Default)]
 pub struct CameraStore {
@@ -147,15 +161,19 @@ pub struct CameraStore {
     pub next_events: Vec<NextEvent>,
     /// Light met by segments that left an arrival, in their order.
     pub hits: Vec<EmissionHit>,
+    /// Contributions that were not finite and were dropped.
+    pub dropped: u64,
 }
 
-/// The lights' side of an iteration. Both have one element for every arrival.
+/// The lights' side of an iteration. All have one element for every arrival, but for `carries`.
 #[derive(Debug, Default)]
 pub struct LightStore {
     /// Ends of segments, path by path.
     pub arrivals: Vec<Arrival>,
     /// What they carry.
     pub photons: Vec<Photon>,
+    /// Empty unless the literal recursion asked for it.
+    pub carries: Vec<Carry>,
 }
 
 fn bytes<T>(v: &Vec<T>) -> usize {
@@ -186,6 +204,7 @@ impl CameraStore {
         self.inverse_n2.append(&mut other.inverse_n2);
         self.outgoing.append(&mut other.outgoing);
         self.next_events.append(&mut other.next_events);
+        self.dropped += other.dropped;
         self.hits.extend(other.hits.drain(..).map(|h| EmissionHit { arrival: h.arrival + first, ..h }));
         first
     }
@@ -197,24 +216,27 @@ impl CameraStore {
         self.outgoing.clear();
         self.next_events.clear();
         self.hits.clear();
+        self.dropped = 0;
     }
 }
 
 impl LightStore {
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        bytes(&self.arrivals) + bytes(&self.photons)
+        bytes(&self.arrivals) + bytes(&self.photons) + bytes(&self.carries)
     }
 
     /// Appends the paths of another store.
     pub fn append(&mut self, other: &mut Self) {
         self.arrivals.append(&mut other.arrivals);
         self.photons.append(&mut other.photons);
+        self.carries.append(&mut other.carries);
     }
 
     /// Empties the store and keeps its memory.
     pub fn clear(&mut self) {
         self.arrivals.clear();
         self.photons.clear();
+        self.carries.clear();
     }
 }

@@ -5,9 +5,9 @@
 //! arrivals of a cluster, so one sum of `q` serves all. Others are evaluated pair by pair, and the values of the
 //! lobes are kept for the gathering.
 
-use super::Cut;
 use super::cluster::{Cluster, Clusters};
 use super::store::{CameraStore, LightStore, NextEvent};
+use super::{Cut, Estimator};
 use crate::shading::bsdf::Bsdf;
 use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
@@ -23,13 +23,16 @@ pub struct Density {
     pub light: f32,
 }
 
-/// Lobe values of a cluster that does not factorise: for every camera arrival, those of the directions of all
-/// segments that leave, then those of all photons, the latter times `(n_o / n_i)^2`.
+/// Lobe values of a cluster that does not factorise: for every camera arrival (and, if the literal recursion asks,
+/// every light arrival), those of the directions of all segments that leave, then those of all photons, the
+/// latter times `(n_o / n_i)^2`.
 #[derive(Clone, Copy, Debug)]
 pub struct Matrix {
     batch: u32,
     start: u32,
     columns: u32,
+    owns: u32,
+    lights: u32,
 }
 
 /// Densities of an iteration. The arrays follow the order of the clusters.
@@ -37,11 +40,13 @@ pub struct Matrix {
 pub struct Weights {
     /// One for every arrival.
     pub densities: Vec<Density>,
-    /// Basic radiance from next-event segments, reflected at every camera arrival.
+    /// Basic radiance from next-event segments, reflected at every camera arrival; at light arrivals, for the
+    /// literal recursion, towards where their paths go on.
     pub direct: Vec<Vec3>,
     /// One for every cluster; unused for diffuse ones.
     matrices: Vec<Matrix>,
     values: Vec<Vec<Vec3>>,
+    owns: Vec<Vec<f32>>,
 }
 
 /// Clusters that are weighed together.
@@ -61,6 +66,12 @@ pub struct Sampled<'a> {
 }
 
 impl<'a> Sampled<'a> {
+    /// Cluster of arrival number `i`.
+    #[inline]
+    pub fn cluster_of(&self, i: usize) -> &'a Cluster {
+        &self.clusters.clusters[self.clusters.of[i] as usize]
+    }
+
     /// Indices of the cluster's camera arrivals.
     pub fn cameras(&self, c: &Cluster) -> impl ExactSizeIterator<Item = usize> + Clone + use<'a> {
         let order = &self.clusters.order;
@@ -80,13 +91,15 @@ struct Batch {
     direct: Vec<Vec3>,
     starts: Vec<(u32, u32)>,
     values: Vec<Vec3>,
+    owns: Vec<f32>,
 }
 
 impl Weights {
-    /// Weighs all segments. Returns `false` if it was stopped.
-    pub fn weigh(&mut self, s: Sampled, cut: &Cut) -> bool {
+    /// Weighs all segments, for an estimator. Returns `false` if it was stopped.
+    pub fn weigh(&mut self, s: Sampled, estimator: Estimator, cut: &Cut) -> bool {
         // the lobes' values are most of the memory: not twice
         self.values.clear();
+        self.owns.clear();
         let batches: Vec<Batch> = s
             .clusters
             .clusters
@@ -97,12 +110,13 @@ impl Weights {
                     if cut.is_raised() {
                         break;
                     }
-                    let start = batch.values.len() as u32;
+                    batch.starts.push((batch.values.len() as u32, batch.owns.len() as u32));
                     match c.class {
                         SurfaceClass::Diffuse => diffuse(s, c, &mut batch),
-                        SurfaceClass::Reflecting | SurfaceClass::Transmitting => paired(s, c, &mut batch),
+                        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+                            paired(s, c, estimator, &mut batch)
+                        }
                     }
-                    batch.starts.push((start, c.cameras + c.lights));
                 }
                 batch
             })
@@ -113,25 +127,39 @@ impl Weights {
         self.densities.clear();
         self.direct.clear();
         self.matrices.clear();
-        for (b, batch) in (0..).zip(batches) {
+        let groups = s.clusters.clusters.chunks(BATCH);
+        for ((b, batch), clusters) in (0..).zip(batches).zip(groups) {
             self.densities.extend(batch.densities);
             self.direct.extend(batch.direct);
-            self.matrices.extend(batch.starts.iter().map(|&(start, columns)| Matrix {
+            self.matrices.extend(batch.starts.iter().zip(clusters).map(|(&(start, owns), c)| Matrix {
                 batch: b,
                 start,
-                columns,
+                columns: c.cameras + c.lights,
+                owns,
+                lights: c.lights,
             }));
             self.values.push(batch.values);
+            self.owns.push(batch.owns);
         }
         true
     }
 
-    /// Values of the lobes of the `row`-th camera arrival of a cluster that is not diffuse.
+    /// Values of the lobes of the `row`-th arrival of a cluster that is not diffuse: a camera's, unless the literal
+    /// recursion asked for all.
     #[inline]
     pub fn row(&self, cluster: usize, row: usize) -> &[Vec3] {
         let m = &self.matrices[cluster];
         let start = m.start as usize + row * m.columns as usize;
         &self.values[m.batch as usize][start..start + m.columns as usize]
+    }
+
+    /// Of the segment that brought the `row`-th camera arrival of a cluster that is not diffuse: every light
+    /// arrival's part of `P_light`.
+    #[inline]
+    pub fn own(&self, cluster: usize, row: usize) -> &[f32] {
+        let m = &self.matrices[cluster];
+        let start = m.owns as usize + row * m.lights as usize;
+        &self.owns[m.batch as usize][start..start + m.lights as usize]
     }
 
     /// Memory, bytes.
@@ -140,6 +168,7 @@ impl Weights {
             + self.direct.capacity() * size_of::<Vec3>()
             + self.matrices.capacity() * size_of::<Matrix>()
             + self.values.iter().map(|v| v.capacity() * size_of::<Vec3>()).sum::<usize>()
+            + self.owns.iter().map(|v| v.capacity() * size_of::<f32>()).sum::<usize>()
     }
 }
 
@@ -177,11 +206,11 @@ fn diffuse(s: Sampled, c: &Cluster, batch: &mut Batch) {
             camera: q_camera * a.back_pdf,
             light: (q_light - f64::from(a.survival)) as f32 * s.light.photons[j].pdf,
         });
-        batch.direct.push(Vec3::ZERO);
+        batch.direct.push(a.reflectance * arriving);
     }
 }
 
-fn paired(s: Sampled, c: &Cluster, batch: &mut Batch) {
+fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let cameras: Vec<(usize, Bsdf)> = s.cameras(c).map(|i| (i, s.camera.arrivals[i].bsdf(s.world))).collect();
     let lights: Vec<(usize, Bsdf)> = s.lights(c).map(|j| (j, s.light.arrivals[j].bsdf(s.world))).collect();
     let (n, m) = (cameras.len(), lights.len());
@@ -189,10 +218,16 @@ fn paired(s: Sampled, c: &Cluster, batch: &mut Batch) {
     batch.densities.resize(first + n + m, Density::default());
     batch.direct.resize(first + n + m, Vec3::ZERO);
     let matrix = batch.values.len();
-    batch.values.resize(matrix + n * (n + m), Vec3::ZERO);
+    let rows = match estimator {
+        Estimator::LeaveOneOut => n,
+        Estimator::Literal => n + m,
+    };
+    let owns = batch.owns.len();
+    batch.owns.resize(owns + n * m, 0.0);
+    batch.values.resize(matrix + rows * (n + m), Vec3::ZERO);
     let densities = &mut batch.densities[first..];
     let mut next_event_pdfs = vec![0.0; n];
-    let mut next_event_values = vec![Vec3::ZERO; n * n];
+    let mut next_event_values = vec![Vec3::ZERO; rows * n];
     for (row, (t, bsdf)) in cameras.iter().enumerate() {
         let a = &s.camera.arrivals[*t];
         let look = |w: Vec3| (a.survival * bsdf.continuous_pdf(a.wo, w).0, bsdf.eval(a.wo, w));
@@ -216,11 +251,36 @@ fn paired(s: Sampled, c: &Cluster, batch: &mut Batch) {
             batch.values[matrix + row * (n + m) + n + column] = value / bsdf.relative_index(a.wo, w).powi(2);
         }
     }
+    for row in n..rows {
+        let photon = &s.light.photons[lights[row - n].0];
+        if photon.pdf <= 0.0 {
+            continue;
+        }
+        let wo = photon.direction;
+        let bsdf = s.light.arrivals[lights[row - n].0].bsdf_from(s.world, wo);
+        for (column, (i, _)) in cameras.iter().enumerate() {
+            if s.camera.arrivals[*i].goes_on {
+                let value = bsdf.eval(wo, s.camera.outgoing[*i].direction);
+                batch.values[matrix + row * (n + m) + column] = value;
+            }
+            let next_event = &s.camera.next_events[*i];
+            if next_event.next_event_pdf > 0.0 {
+                next_event_values[row * n + column] = bsdf.eval(wo, next_event.direction);
+            }
+        }
+        for (column, (j, _)) in lights.iter().enumerate() {
+            let w = s.light.arrivals[*j].wo;
+            let value = bsdf.eval(wo, w) / bsdf.relative_index(wo, w).powi(2);
+            batch.values[matrix + row * (n + m) + n + column] = value;
+        }
+    }
     for (t, (own, bsdf)) in lights.iter().enumerate() {
         let a = &s.light.arrivals[*own];
         let pdf = |w: Vec3| a.survival * bsdf.continuous_pdf(a.wo, w).0;
         for (row, (i, _)) in cameras.iter().enumerate() {
-            densities[row].light += pdf(s.camera.arrivals[*i].wo);
+            let part = pdf(s.camera.arrivals[*i].wo);
+            densities[row].light += part;
+            batch.owns[owns + row * m + t] = part;
         }
         for (other, (j, _)) in lights.iter().enumerate() {
             if other != t && s.light.arrivals[*j].goes_on {
@@ -232,7 +292,7 @@ fn paired(s: Sampled, c: &Cluster, batch: &mut Batch) {
         let next_event = &s.camera.next_events[*i];
         if next_event.next_event_pdf > 0.0 {
             let value = next_event_value(next_event, next_event_pdfs[column], c) / c.area;
-            for row in 0..n {
+            for row in 0..rows {
                 batch.direct[first + row] += next_event_values[row * n + column] * value;
             }
         }

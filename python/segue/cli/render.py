@@ -86,6 +86,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="PIXELS",
         help="edge of the segment method's kernel in the first iteration (default: 4)",
     )
+    add(
+        "--estimator",
+        choices=("leave-one-out", "literal"),
+        help="how the segment method uses light segments: consistently (default), or by the paper's "
+        "recursion as written, which is too bright where photons are few",
+    )
     stop = parser.add_mutually_exclusive_group()
     stop.add_argument("--samples", type=_count, metavar="N", help="stop after N samples a pixel")
     stop.add_argument("--time", type=_positive, metavar="SECONDS", help="stop after this time")
@@ -164,6 +170,8 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
         settings["kernel"] = options.kernel
     if options.kernel_size:
         settings["kernel_size"] = options.kernel_size
+    if options.estimator:
+        settings["estimator"] = options.estimator
     if options.max_depth is not None:
         settings["max_depth"] = options.max_depth
     if options.passes:

@@ -1,0 +1,193 @@
+//! The paper's recursion as written (S20, S22): every segment, whoever sampled it, brings what is gathered in the
+//! cluster where it begins on the side of the light, divided by the densities of all techniques.
+//!
+//! Kept for comparison. Of a segment that a light path sampled it is known that a photon landed where it begins, so
+//! gathering there again counts that photon more than its share: up to twofold a bounce where photons are
+//! few. `propagate` leaves it out instead.
+
+use super::Cut;
+use super::depth::longest_chain;
+use super::exchange::{
+    FromPhotons, GRAIN, Segment, emitted, has_end, per_diffuse_cluster, photon_value, reciprocal, segments,
+};
+use super::propagate::Reflected;
+use super::store::Rivals;
+use super::weigh::{Sampled, Weights};
+use crate::math::luminance;
+use crate::shading::SurfaceClass;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::collections::VecDeque;
+
+/// Change of the mean, relative to it, below which sweeping stops. The start is nothing, so it is finer than that of
+/// the other estimator.
+const TOLERANCE: f64 = 1e-4;
+/// Fewest and most sweeps without a limit of bounces.
+const SWEEPS: [u32; 2] = [3, 128];
+
+impl Reflected {
+    /// As [`Reflected::solve_limited`], by the recursion as written: from nothing, as many sweeps as `bounces`, or
+    /// until the mean stands still.
+    pub fn solve_literal(
+        &mut self,
+        s: Sampled,
+        w: &Weights,
+        first: &[(u32, u32)],
+        bounces: Option<u32>,
+        cut: &Cut,
+    ) -> bool {
+        let recursion = Recursion { s, w, segments: segments(s, w), photons: photon_segments(s, w) };
+        // without a limit a chain counts no more than a straight segment
+        let sweeps_of = |passages: u32| if bounces.is_some() { passages } else { 0 };
+        let chains = recursion.photons.iter().map(|p| p.passages).max().unwrap_or(0);
+        let kept = 1 + sweeps_of(chains.max(longest_chain(s, first))) as usize;
+        let mut levels = VecDeque::from([vec![Vec3::ZERO; s.clusters.of.len()]]);
+        let n = s.camera.arrivals.len();
+        self.direct = vec![Vec3::ZERO; n];
+        let mut before = 0.0;
+        for k in 1..=bounces.unwrap_or(SWEEPS[1]) {
+            if cut.is_raised() {
+                return false;
+            }
+            let most = (bounces.is_some() || k == 1).then_some(k - 1);
+            let read = |i: usize, passages: u32| {
+                levels.iter().rev().nth(sweeps_of(passages) as usize).map_or(Vec3::ZERO, |l: &Vec<Vec3>| l[i])
+            };
+            let next = recursion.sweep(read, most, cut);
+            if k == 1 {
+                self.direct.copy_from_slice(&next[..n]);
+            }
+            levels.push_back(next);
+            if levels.len() > kept {
+                levels.pop_front();
+            }
+            let last = &levels[levels.len() - 1];
+            let now = first.iter().map(|&(i, _)| f64::from(luminance(last[i as usize]))).sum::<f64>();
+            let change = (now - before).abs();
+            before = now;
+            if bounces.is_none() && k >= SWEEPS[0] && change <= TOLERANCE * now {
+                break;
+            }
+        }
+        (self.carried, self.photons) = (vec![Vec3::ZERO; n], vec![FromPhotons::default(); n]);
+        for &(arrival, passages) in first {
+            if let Some(level) = levels.iter().rev().nth(sweeps_of(passages) as usize) {
+                self.carried[arrival as usize] = level[arrival as usize];
+            }
+        }
+        true
+    }
+}
+
+/// A segment that a light path sampled, seen from the camera.
+#[derive(Clone, Copy)]
+struct LightSegment {
+    /// Light over its density, if a light stands at its beginning: `E / D_E`.
+    emitted: Vec3,
+    /// Factor on what is reflected at its beginning: `T / D_R`.
+    carry: Vec3,
+    /// Dirac lobes passed.
+    passages: u32,
+}
+
+/// The light segments, by the arrivals that they brought.
+fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
+    let n = s.camera.arrivals.len();
+    let one = |j: usize| {
+        let (photon, carry) = (&s.light.photons[j], &s.light.carries[j]);
+        let Rivals::Later { light_choices, squeeze } = photon.rivals else {
+            return LightSegment {
+                emitted: photon_value(s, w, j) * (s.cluster_of(n + j).area * carry.inverse_n2),
+                carry: Vec3::ZERO,
+                passages: photon.bounces,
+            };
+        };
+        let before = j - 1;
+        let own = s.light.arrivals[before].survival * s.light.photons[before].pdf;
+        let p_light = w.densities[s.clusters.place[n + before] as usize].light + own;
+        let p_camera = photon.camera_choices * w.densities[s.clusters.place[n + j] as usize].camera;
+        let light = light_choices * squeeze * p_light / s.cluster_of(n + before).area;
+        LightSegment {
+            emitted: Vec3::ZERO,
+            carry: carry.throughput * reciprocal(light + p_camera / s.cluster_of(n + j).area),
+            passages: photon.bounces - s.light.photons[before].bounces - 1,
+        }
+    };
+    (0..s.light.photons.len()).into_par_iter().with_min_len(GRAIN).map(one).collect()
+}
+
+/// What stays the same from sweep to sweep.
+struct Recursion<'a> {
+    s: Sampled<'a>,
+    w: &'a Weights,
+    segments: Vec<Segment>,
+    photons: Vec<LightSegment>,
+}
+
+impl Recursion<'_> {
+    /// What every arrival reflects, by number: a camera's along its segment, a light's along the segment with which
+    /// its path goes on. `read`: what arrival `i` reflected, for a segment of so many passages; `most`: passages up
+    /// to which light counts.
+    fn sweep(&self, read: impl Fn(usize, u32) -> Vec3 + Sync, most: Option<u32>, cut: &Cut) -> Vec<Vec3> {
+        let Self { s, w, segments, photons } = self;
+        let n = s.camera.arrivals.len();
+        let leaving = |i: usize| {
+            let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing[i].passages), Vec3::ZERO));
+            segments[i].value(emitted(*s, w, i, most), end)
+        };
+        let brought = |j: usize| {
+            let p = &photons[j];
+            if p.carry == Vec3::ZERO {
+                return if most.is_none_or(|m| p.passages <= m) { p.emitted } else { Vec3::ZERO };
+            }
+            p.carry * read(n + j - 1, p.passages)
+        };
+        let numbers = || (0..s.clusters.of.len()).into_par_iter().with_min_len(GRAIN);
+        let values: Vec<Vec3> = numbers().map(|i| if i < n { leaving(i) } else { brought(i - n) }).collect();
+        let shared = per_diffuse_cluster(*s, cut, |c| {
+            let cameras = s.cameras(c).map(|i| (values[i] * s.camera.outgoing[i].pdf).as_dvec3());
+            let lights = s.lights(c).map(|j| (values[n + j] * s.light.arrivals[j].back_pdf).as_dvec3());
+            (cameras.sum::<DVec3>() + lights.sum::<DVec3>()).as_vec3() / c.area
+        });
+        let reflected = |i: usize| {
+            if cut.is_raised() || (i >= n && s.light.photons[i - n].pdf <= 0.0) {
+                return Vec3::ZERO;
+            }
+            let (k, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
+            let c = &s.clusters.clusters[k];
+            let gathered = match c.class {
+                SurfaceClass::Diffuse => self.reflectance(i) * shared[k],
+                SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+                    let (to_camera, to_light) =
+                        w.row(k, (place - c.first) as usize).split_at(c.cameras as usize);
+                    let cameras: Vec3 = to_camera.iter().zip(s.cameras(c)).map(|(f, i)| *f * values[i]).sum();
+                    // the row holds f (n_o / n_i)^2, and radiance is basic
+                    let lights = to_light.iter().zip(s.lights(c)).map(|(f, j)| {
+                        *f * values[n + j] * (self.inverse_n2(i) / s.light.carries[j].inverse_n2)
+                    });
+                    (cameras + lights.sum::<Vec3>()) / c.area
+                }
+            };
+            w.direct[place as usize] + gathered
+        };
+        numbers().map(reflected).collect()
+    }
+
+    fn reflectance(&self, i: usize) -> Vec3 {
+        let n = self.s.camera.arrivals.len();
+        if i < n { self.s.camera.arrivals[i].reflectance } else { self.s.light.arrivals[i - n].reflectance }
+    }
+
+    /// `1 / n^2` on the side to which arrival `i` reflects.
+    fn inverse_n2(&self, i: usize) -> f32 {
+        let n = self.s.camera.arrivals.len();
+        if i < n {
+            return self.s.camera.inverse_n2[i];
+        }
+        // where the path goes on, seen from its next arrival
+        match self.s.light.photons.get(i - n + 1).map(|next| &next.rivals) {
+            Some(Rivals::Later { squeeze, .. }) => self.s.light.carries[i - n + 1].inverse_n2 * squeeze,
+            _ => self.s.light.carries[i - n].inverse_n2,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! What an iteration's graph looks like, in figures: how large its clusters are, and how strongly the transfer
+//! operator feeds back. Its spectral radius is at most its largest row sum.
+
+use super::Cut;
+use super::exchange::{per_arrival, per_diffuse_cluster, segments};
+use super::weigh::{Sampled, Weights};
+use crate::shading::SurfaceClass;
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+/// Figures of one iteration.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Clusters by their number of arrivals: element `k` counts those with `2^k` to `2^(k+1) - 1`.
+    pub sizes: Vec<u64>,
+    /// Arrivals of the largest cluster.
+    pub largest: u32,
+    /// Row sums of the transfer operator between camera segments, largest channel.
+    pub row_sums: RowSums,
+}
+
+/// How strongly arrivals reflect what leaves their clusters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RowSums {
+    /// The least.
+    pub least: f32,
+    /// Their mean.
+    pub mean: f64,
+    /// The largest.
+    pub largest: f32,
+}
+
+/// Looks at an iteration. If it was stopped, what it says is incomplete.
+pub fn report(s: Sampled, w: &Weights, cut: &Cut) -> Report {
+    let mut sizes = Vec::new();
+    let mut largest = 0;
+    for c in &s.clusters.clusters {
+        let n = c.cameras + c.lights;
+        largest = largest.max(n);
+        let k = n.ilog2() as usize;
+        if sizes.len() <= k {
+            sizes.resize(k + 1, 0);
+        }
+        sizes[k] += 1;
+    }
+    Report { sizes, largest, row_sums: row_sums(s, w, cut) }
+}
+
+fn row_sums(s: Sampled, w: &Weights, cut: &Cut) -> RowSums {
+    let constants = segments(s, w);
+    let shared = per_diffuse_cluster(s, cut, |c| {
+        let leaving = s.cameras(c).map(|i| (constants[i].carry * s.camera.outgoing[i].pdf).as_dvec3());
+        leaving.sum::<DVec3>().as_vec3() / c.area
+    });
+    let sums = per_arrival(s, cut, |i, k, c| match c.class {
+        SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * shared[k],
+        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+            let f = w.row(k, (s.clusters.place[i] - c.first) as usize);
+            f.iter().zip(s.cameras(c)).map(|(f, i)| *f * constants[i].carry).sum::<Vec3>() / c.area
+        }
+    });
+    let mut found = RowSums { least: f32::INFINITY, ..RowSums::default() };
+    for sum in sums.iter().map(|v| v.max_element()) {
+        found.least = found.least.min(sum);
+        found.largest = found.largest.max(sum);
+        found.mean += f64::from(sum) / sums.len() as f64;
+    }
+    if sums.is_empty() { RowSums::default() } else { found }
+}

@@ -1,0 +1,186 @@
+//! Cluster areas. What matters of an estimate is what it does to the photons that are divided by it: the mean, over
+//! photons that fall uniformly, of the true area over the estimate, which is one for a perfect estimator.
+
+use crate::common::{Stage, icosphere};
+use crate::support::{ON, arrive, mean, sensor, world};
+use glam::{DMat4, DVec3, Vec2, Vec3};
+use segue::math::sampler::hash_unit;
+use segue::math::warp;
+use segue::shading::World;
+use segue::transport::cluster::{Cluster, Clusters, Numbered};
+use segue::transport::grid::Grid;
+use segue::transport::store::Arrival;
+use std::f64::consts::PI;
+
+const GREY: &str = r#"{"surface":{"type":"diffuse","color":0.5}}"#;
+/// Edge of the voxels, about.
+const EDGE: f32 = 0.12;
+
+/// Photons that fall vertically, or along -x or -y, each uniformly over the side of the unit cube that they meet.
+fn photons(world: &World, seed: u32, sides: &[Vec3], count: u32) -> Vec<Arrival> {
+    let u = |k: u32, d| hash_unit(seed ^ 0x3a11, 4 * k + d);
+    (0..count)
+        .filter_map(|k| {
+            let side = sides[k as usize % sides.len()];
+            let across = Vec3::new(u(k, 0), u(k, 1), u(k, 2)) * (Vec3::ONE - side);
+            arrive(world, across + side, -side)
+        })
+        .collect()
+}
+
+/// True areas of the clusters of some arrivals, where they are known.
+type Truth<'a> = &'a dyn Fn(&Grid, &[Arrival]) -> Vec<Option<f64>>;
+
+/// Mean of the true area over the estimate, by the method of the engine and by the paper's plane.
+fn bias(world: &World, seeds: u32, photons: impl Fn(u32) -> Vec<Arrival>, truth: Truth) -> [f64; 2] {
+    let sensor = sensor(EDGE);
+    let (mut sums, mut count) = ([0.0; 2], 0.0);
+    for seed in 0..seeds {
+        let photons = photons(seed);
+        let grid = Grid::new(&sensor, 1.0, seed);
+        let all = Numbered { camera: &[], light: &photons };
+        let areas: [Vec<f32>; 2] = [true, false].map(|exact| {
+            let mut clusters = Clusters::default();
+            assert!(clusters.group(world, &grid, all, &ON));
+            assert!(clusters.measure(world, &grid, all, exact, &ON));
+            clusters.of.iter().map(|&c| clusters.clusters[c as usize].area).collect()
+        });
+        for (i, exact) in truth(&grid, &photons).into_iter().enumerate() {
+            let Some(exact) = exact else { continue };
+            count += 1.0;
+            for (sum, areas) in sums.iter_mut().zip(&areas) {
+                *sum += exact / f64::from(areas[i]);
+            }
+        }
+    }
+    sums.map(|s| s / count)
+}
+
+/// The part of a voxel in which one of the faces `x = 0`, `y = 0` or `z = 0` of the positive octant lies: a rectangle.
+fn of_octant(grid: &Grid, arrivals: &[Arrival], sides: &[Vec3]) -> Vec<Option<f64>> {
+    let area = |a: &Arrival| {
+        let (low, edge) = grid.place(&grid.voxel(a.position));
+        let extent = low + edge - low.max(Vec3::ZERO);
+        let along_the_face = a.normal.abs().cmplt(Vec3::splat(0.5));
+        // a face goes on for ever where no other begins, and ends at one
+        let on = |v: Vec3| Vec3::select(along_the_face, v, Vec3::splat(0.5));
+        let open = Vec3::ONE - sides.iter().sum::<Vec3>();
+        let is_inside = on(low + edge).max_element() < 1.0 && (on(low) * open).min_element() >= 0.0;
+        is_inside.then(|| Vec3::select(along_the_face, extent, Vec3::ONE).as_dvec3().element_product())
+    };
+    arrivals.iter().map(area).collect()
+}
+
+fn quad(s: &mut Stage, corners: [[f32; 3]; 4], material: u32) {
+    let mesh = s.mesh(&corners.map(Vec3::from), &[0, 1, 2, 0, 2, 3], None);
+    s.place(mesh, material, DMat4::IDENTITY);
+}
+
+#[test]
+fn areas_on_a_plane_at_an_edge_and_in_a_corner() {
+    let mut s = Stage::default();
+    let grey = s.material(GREY);
+    let (floor, wall, other) = (Vec3::Z, Vec3::X, Vec3::Y);
+    quad(&mut s, [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]], grey);
+    let cases = [("plane", vec![floor]), ("edge", vec![floor, wall]), ("corner", vec![floor, wall, other])];
+    for (name, sides) in cases {
+        match name {
+            "edge" => quad(&mut s, [[0., 0., 0.], [0., 1., 0.], [0., 1., 1.], [0., 0., 1.]], grey),
+            "corner" => quad(&mut s, [[0., 0., 0.], [0., 0., 1.], [1., 0., 1.], [1., 0., 0.]], grey),
+            _ => {}
+        }
+        let world = world(&mut s);
+        let found =
+            bias(&world, 24, |seed| photons(&world, seed, &sides, 20_000), &|g, a| of_octant(g, a, &sides));
+        println!(
+            "{name}: coverage {:+.3} %, plane cut {:+.3} %",
+            100.0 * (found[0] - 1.0),
+            100.0 * (found[1] - 1.0)
+        );
+        assert!((found[0] - 1.0).abs() < 4e-3, "{name}: {found:?}");
+        // where the surface ends inside a voxel, the plane goes on and photons are divided by too much
+        match sides.len() {
+            1 => assert!((found[1] - 1.0).abs() < 0.04, "{found:?}"),
+            _ => assert!(found[1] < found[0], "{found:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_tilted_plane_is_cut_exactly() {
+    let mut s = Stage::default();
+    let grey = s.material(GREY);
+    let corners = [[-99., -9., -60.], [99., -9., 61.], [0., 99., 20.]].map(Vec3::from);
+    let mesh = s.mesh(&corners, &[0, 1, 2], None);
+    s.place(mesh, grey, DMat4::IDENTITY);
+    let world = world(&mut s);
+    let sensor = sensor(EDGE);
+    for seed in 0..20 {
+        let u = |d| hash_unit(seed, d) - 0.5;
+        let a = arrive(&world, Vec3::new(u(0), u(1), 99.0), -Vec3::Z).unwrap();
+        let grid = Grid::new(&sensor, 1.0, seed);
+        let (low, edge) = grid.place(&grid.voxel(a.position));
+        // points of the plane above a fine lattice, those inside the voxel
+        let n = 1000;
+        let cell = edge / n as f32;
+        let inside = (0..n * n)
+            .filter(|k| {
+                let p = low + Vec3::new((k % n) as f32 + 0.5, (k / n) as f32 + 0.5, 0.0) * cell;
+                let z = a.position.z - ((p - a.position) * a.normal).truncate().element_sum() / a.normal.z;
+                (low.z..low.z + edge).contains(&z)
+            })
+            .count();
+        let exact = inside as f32 * cell * cell / a.normal.z.abs();
+        let mut clusters = Clusters::default();
+        let all = Numbered { camera: &[], light: &[a, a] };
+        assert!(clusters.group(&world, &grid, all, &ON) && clusters.measure(&world, &grid, all, true, &ON));
+        let got = clusters.clusters[0].area;
+        assert!((got / exact - 1.0).abs() < 5e-3, "{got} {exact}");
+    }
+}
+
+/// On a sphere a cluster is what its voxel and its bin of normals share, in two parts where it curves out of sight:
+/// no closed form. But the density of uniform photons that uniform points find there is known.
+#[test]
+fn photons_on_spheres_are_as_dense_as_they_are() {
+    for radius in [0.4f32, 1.0, 3.0] {
+        let mut s = Stage::default();
+        let grey = s.material(GREY);
+        let (points, triangles) = icosphere(5);
+        let mesh = s.mesh(&points, &triangles, Some(&points));
+        s.place(mesh, grey, DMat4::from_scale(DVec3::splat(f64::from(radius))));
+        let world = world(&mut s);
+        let uniform = |seed: u32, count: u32| -> Vec<Arrival> {
+            let direction =
+                |k: u32| warp::uniform_sphere(Vec2::new(hash_unit(seed, 2 * k), hash_unit(seed, 2 * k + 1)));
+            (0..count).filter_map(|k| arrive(&world, 2.0 * radius * direction(k), -direction(k))).collect()
+        };
+        let sensor = sensor(EDGE);
+        let (photons, queries) = ((15_000.0 * radius * radius) as u32, 10_000);
+        let exact = f64::from(photons) / (4.0 * PI * f64::from(radius * radius));
+        let density = |seed: u32| {
+            let (camera, light) = (uniform(2 * seed, queries), uniform(2 * seed + 1, photons));
+            let grid = Grid::new(&sensor, 1.0, seed);
+            let all = Numbered { camera: &camera, light: &light };
+            [true, false].map(|by_coverage| {
+                let mut clusters = Clusters::default();
+                assert!(clusters.group(&world, &grid, all, &ON));
+                assert!(clusters.measure(&world, &grid, all, by_coverage, &ON));
+                let found = |c: &Cluster| f64::from(c.cameras * c.lights) / f64::from(c.area);
+                clusters.clusters.iter().map(found).sum::<f64>() / f64::from(queries) / exact
+            })
+        };
+        let found: Vec<[f64; 2]> = (0..12).map(density).collect();
+        let (covered, sigma) = mean(&found.iter().map(|f| f[0]).collect::<Vec<_>>());
+        let (plane, _) = mean(&found.iter().map(|f| f[1]).collect::<Vec<_>>());
+        println!(
+            "sphere of {:.0} voxels: coverage {:+.2} % (+- {:.2}), plane cut {:+.2} %",
+            radius / EDGE,
+            100.0 * (covered - 1.0),
+            100.0 * sigma,
+            100.0 * (plane - 1.0)
+        );
+        assert!((covered - 1.0).abs() < 0.01 + 3.0 * sigma, "{covered} +- {sigma}");
+        assert!(sigma < 0.01, "too noisy: {sigma}");
+    }
+}
