@@ -7,7 +7,6 @@ from pathlib import Path
 
 from .. import images
 from ..render import Render
-from ..tonemapping import TONEMAPPING as TONEMAPPING
 from ..tonemapping import neutral, to_srgb
 from .status import UsageError
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
-import signal
 import sys
 import time
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -17,41 +14,15 @@ import numpy as np
 from .. import images
 from ..render import Render
 from ..scene import Scene
-from . import output
+from ..tonemapping import TONEMAPPING
+from . import arguments, output
+from .cancellation import Cancellation
 from .curve import Curve
 from .progress import Progress, clock
 from .status import InputError, Status, UsageError
 
 #: When to stop where nothing is said.
 DEFAULT_THRESHOLD, DEFAULT_SECONDS = 0.003, 600.0
-
-
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d+)[xX](\d+)", text)
-    if not match or not (int(match[1]) and int(match[2])):
-        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, such as 1280x720")
-    return int(match[1]), int(match[2])
-
-
-def _frames(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(-?\d+):(-?\d+)", text)
-    if not match or int(match[1]) > int(match[2]):
-        raise argparse.ArgumentTypeError(f"{text!r} is not FIRST:LAST, such as 1:24")
-    return int(match[1]), int(match[2])
-
-
-def _positive(text: str) -> float:
-    number = float(text)
-    if not 0 < number < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not above 0")
-    return number
-
-
-def _count(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not at least 1")
-    return number
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -72,7 +43,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="OUT.exr",
         type=Path,
         help="the picture; a .png is written in addition to an .exr beside it, tonemapped "
-        f"({output.TONEMAPPING}). With --frames the number replaces #### or %%04d",
+        f"({TONEMAPPING}). With --frames the number replaces #### or %%04d",
     )
     add("--integrator", metavar="NAME", help="method: segment (default) or path")
     add(
@@ -82,30 +53,41 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     add(
         "--kernel-size",
-        type=_positive,
+        type=arguments.positive,
         metavar="PIXELS",
         help="edge of the segment method's kernel in the first iteration (default: 4)",
     )
     add(
         "--estimator",
         choices=("leave-one-out", "literal"),
-        help="how the segment method uses light segments: consistently (default), or by the paper's "
-        "recursion as written, which is too bright where photons are few",
+        help="how the segment method uses light segments: consistently (default), or by the "
+        "paper's recursion as written, which is too bright where photons are few",
     )
     stop = parser.add_mutually_exclusive_group()
-    stop.add_argument("--samples", type=_count, metavar="N", help="stop after N samples a pixel")
-    stop.add_argument("--time", type=_positive, metavar="SECONDS", help="stop after this time")
+    stop.add_argument(
+        "--samples", type=arguments.count, metavar="N", help="stop after N samples a pixel"
+    )
+    stop.add_argument(
+        "--time", type=arguments.positive, metavar="SECONDS", help="stop after this time"
+    )
     stop.add_argument(
         "--noise-threshold",
-        type=_positive,
+        type=arguments.positive,
         metavar="E",
         help="stop at this estimated relative mean squared error",
     )
-    add("--resolution", type=_size, metavar="WxH", help="default: the stage's, else 1280 wide")
+    add(
+        "--resolution",
+        type=arguments.size,
+        metavar="WxH",
+        help="default: the stage's, else 1280 wide",
+    )
     add("--camera", metavar="PRIM", help="path or name of a camera (default: the stage's)")
     frames = parser.add_mutually_exclusive_group()
     frames.add_argument("--frame", type=float, metavar="F", help="time code")
-    frames.add_argument("--frames", type=_frames, metavar="A:B", help="every frame from A to B")
+    frames.add_argument(
+        "--frames", type=arguments.frames, metavar="A:B", help="every frame from A to B"
+    )
     add("--max-depth", type=int, metavar="N", help="bounces, -1 without limit (default)")
     add("--threads", type=int, default=0, metavar="N", help="default: all")
     add("--seed", type=int, default=0, metavar="N", help="default: 0")
@@ -114,27 +96,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add("--stats", type=Path, metavar="STATS.json", help="write statistics")
     add("--quiet", action="store_true", help="say nothing but errors")
     parser.set_defaults(run=run)
-
-
-class _Cancellation:
-    """SIGINT and SIGTERM stop the render; a second one stops the program."""
-
-    def __init__(self) -> None:
-        self.requested = False
-        self._before: dict[int, Any] = {}
-
-    def __enter__(self) -> _Cancellation:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._before[number] = signal.signal(number, self._on_signal)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
-        self.requested = True
-        signal.signal(number, self._before[number])
 
 
 def run(options: argparse.Namespace) -> Status:
@@ -148,7 +109,7 @@ def run(options: argparse.Namespace) -> Status:
         first, last = options.frames
         frames = [float(f) for f in range(first, last + 1)]
     collected = []
-    with _Cancellation() as cancellation:
+    with Cancellation() as cancellation:
         for frame in frames:
             stats = _render_frame(options, frame, len(frames) > 1, reference, cancellation)
             if stats is not None:
@@ -194,7 +155,7 @@ def _render_frame(
     frame: float | None,
     many: bool,
     reference: np.ndarray | None,
-    cancellation: _Cancellation,
+    cancellation: Cancellation,
 ) -> dict[str, Any] | None:
     """Renders and writes one frame; returns its statistics, None if it was cancelled early."""
     from .. import usd
