@@ -76,7 +76,7 @@ const SETS: [(&str, &str); 6] = [
     ("camera and next event", r#","light_paths":0"#),
     ("camera alone", r#","light_paths":0,"next_event":false"#),
     ("both without next event", r#","next_event":false"#),
-    ("light alone", r#","camera_paths":false,"next_event":false,"light_paths":2"#),
+    ("light alone", r#","camera_paths":false,"next_event":false,"light_paths":4"#),
     ("light and next event", r#","camera_paths":false,"light_paths":1"#),
 ];
 

@@ -94,6 +94,8 @@ pub struct Context<'a> {
     pub seed: u32,
     /// Whether what lies behind everything is transparent.
     pub transparent_background: bool,
+    /// Leave nothing out, however little it brings.
+    pub keep_all: bool,
     /// Iterations that were completed before.
     pub completed: u32,
     /// Looked at at least every few milliseconds.

@@ -18,6 +18,11 @@ use rayon::prelude::*;
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering::Relaxed;
 
+/// Share of the light below which photons do not pay, as a mean over all arrivals: a caustic on a few hundredths of
+/// the picture is above it.
+const WORTHWHILE: f64 = 2e-3;
+/// Share of the light paths that is still sampled then.
+const IDLE: f32 = 1.0 / 16.0;
 /// Light paths that one task samples.
 const LIGHT_BATCH: u32 = 1024;
 /// Keeps the random numbers of light paths apart from those of pixels.
@@ -38,6 +43,8 @@ pub struct Segment {
     primaries: Vec<Primary>,
     /// First arrival of every camera path that has one.
     starts: Vec<u32>,
+    /// Whether light paths turned out to bring next to nothing, so that only a few are sampled, to look again.
+    light_is_idle: bool,
 }
 
 impl Segment {
@@ -71,7 +78,8 @@ impl Segment {
     /// All stages up to the film. Returns `false` if it was stopped.
     fn transport(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
         let Context { world, sensor, .. } = *context;
-        let light_paths = (self.techniques.light_paths * context.crop.area() as f32).ceil();
+        let per_camera_path = self.techniques.light_paths * if self.light_is_idle { IDLE } else { 1.0 };
+        let light_paths = (per_camera_path * context.crop.area() as f32).ceil();
         if !self.sample_camera(context, index, light_paths, cut) {
             return false;
         }
@@ -112,6 +120,10 @@ impl Segment {
             (_, None) => reflected.solve(sampled, weights, &self.starts, wants_direct, cut),
             (_, Some(limit)) => reflected.solve_limited(sampled, weights, &first(), limit, cut),
         };
+        let may_idle = !context.keep_all && self.techniques.can_do_without_light_paths();
+        // few light paths bring less, as balanced weights go; what they would bring if there were all of them counts
+        let full = self.reflected.photon_share() / if self.light_is_idle { f64::from(IDLE) } else { 1.0 };
+        self.light_is_idle = may_idle && full < WORTHWHILE;
         costs.stage("propagation", self.reflected.bytes());
         context.counters.dropped.fetch_add(self.camera.dropped, Relaxed);
         // figures that hardly change are taken ever more rarely

@@ -225,6 +225,7 @@ impl Session {
     ) -> StopReason {
         let context = |completed: u32| Context {
             completed,
+            keep_all: self.settings.keep_all,
             world: &self.world,
             sensor: &self.sensor,
             film: &self.film,

@@ -233,3 +233,6 @@ pub(super) fn per_arrival<T: Default + Send>(
     };
     per_index(s, one)
 }
+
+#[cfg(test)]
+mod tests;

@@ -46,7 +46,7 @@ pub struct Techniques {
     pub estimator: Estimator,
     /// The kernel.
     pub kernel: kernel::Kernel,
-    /// Light paths for each camera path; zero: none.
+    /// Most light paths for each camera path; zero: none.
     pub light_paths: f32,
     /// Whether arrivals of camera paths sample next-event segments.
     pub next_event: bool,
@@ -54,12 +54,19 @@ pub struct Techniques {
     pub camera_paths: bool,
 }
 
+impl Techniques {
+    /// Whether everything a camera path can see is found without light paths, if less well.
+    pub fn can_do_without_light_paths(&self) -> bool {
+        self.camera_paths && self.next_event && self.estimator == Estimator::LeaveOneOut
+    }
+}
+
 impl Default for Techniques {
     fn default() -> Self {
         Self {
             estimator: Estimator::default(),
             kernel: kernel::Kernel::default(),
-            light_paths: 0.25,
+            light_paths: 1.0,
             next_event: true,
             camera_paths: true,
         }

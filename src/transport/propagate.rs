@@ -71,6 +71,16 @@ impl Reflected {
         !cut.is_raised()
     }
 
+    /// Share of photons in the light that arrivals reflect: the mean over all of them.
+    pub fn photon_share(&self) -> f64 {
+        let share = |(photons, carried): (&FromPhotons, &Vec3)| {
+            let (p, c) = (luminance(photons.reflected), luminance(*carried));
+            // false for NaN
+            if p > 0.0 { f64::from(p / (p + c)) } else { 0.0 }
+        };
+        self.photons.iter().zip(&self.carried).map(share).sum::<f64>() / self.photons.len().max(1) as f64
+    }
+
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         let vectors = self.carried.capacity() + self.direct.capacity();

@@ -1,0 +1,144 @@
+//! The weights of all techniques that could have made a segment sum to one.
+
+use super::*;
+use crate::math::{Sampler, warp};
+use crate::scene::mesh::MeshInput;
+use crate::scene::{Camera, InstanceGroup, SceneBuilder};
+use crate::shading::bsdf::Walk;
+use crate::shading::{CameraRay, Piece, Sensor, World};
+use crate::transport::Estimator;
+use crate::transport::arrival::arrival;
+use crate::transport::cluster::{Clusters, Numbered};
+use crate::transport::grid::Grid;
+use crate::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing};
+use crate::transport::walk::{Follow, Nobody};
+use std::sync::Arc;
+
+const CAMERA: &str = r#"{"window":[-1,1,-1,1]}"#;
+
+/// A closed room of one material, with a pane of glass across it.
+fn room(wall: &str) -> World {
+    let mut b = SceneBuilder::default();
+    let identity: [f64; 16] = std::array::from_fn(|k| f64::from(u8::from(k % 5 == 0)));
+    let mut place = |points: &[Vec3], faces: &[u32], material: &str| {
+        let material = b.add_material("material", material).unwrap();
+        let input = MeshInput { name: "mesh", points, face_indices: faces, ..Default::default() };
+        let mesh = b.add_mesh(&input).unwrap();
+        let group = InstanceGroup {
+            name: "object".into(),
+            mesh,
+            materials: vec![material],
+            camera_visible: true,
+            two_sided_emission: true,
+            object_index: 0,
+        };
+        b.add_instances(group, &[identity]).unwrap();
+    };
+    let corner = |k: u32| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32) * 2.0 - 1.0;
+    #[rustfmt::skip]
+    let faces = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3];
+    let cube: Vec<Vec3> = (0..8).map(corner).collect();
+    place(&cube, &faces, wall);
+    let pane: Vec<Vec3> = cube.iter().map(|p| *p * Vec3::new(0.8, 0.8, 0.05)).collect();
+    let outwards: Vec<u32> = faces.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
+    place(&pane, &outwards, r#"{"surface":{"type":"glass","ior":1.5}}"#);
+    b.set_camera("camera", CAMERA).unwrap();
+    World::new(Arc::new(b.build().unwrap()), false).unwrap()
+}
+
+/// Camera segments, and the same segments made by light paths: arrival `2 k` of the light's side stands where segment
+/// `k` ends and arrival `2 k + 1` where it begins.
+fn both_ways(world: &World, count: u32) -> (CameraStore, LightStore) {
+    let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
+    let follow = Follow { world, walk: Walk::Camera, from_camera: false };
+    let mut push = |a: Arrival, out: Outgoing| {
+        camera.arrivals.push(a);
+        camera.inverse_n2.push(1.0);
+        camera.outgoing.push(out);
+        camera.next_events.push(NextEvent::default());
+    };
+    for k in 0..count {
+        let mut sampler = Sampler::new(5, 0, k);
+        let direction = warp::uniform_sphere(sampler.next_2d());
+        let ray = CameraRay { origin: Vec3::new(0.1, 0.2, 0.5), direction, range: [0.0, f32::INFINITY] };
+        let Some(end) = follow.segment(Piece::from_camera(&ray), &mut sampler, &mut Nobody, &mut 0).1 else {
+            continue;
+        };
+        let mut a = arrival(world, &end);
+        let Some(sample) = end.vertex.bsdf.sample_continuous(end.wo, Walk::Camera, sampler.next_3d()) else {
+            continue;
+        };
+        a.goes_on = true;
+        let piece = Piece::leaving(&end.hit, sample.direction);
+        let (chain, next) = follow.segment(piece, &mut sampler, &mut Nobody, &mut 0);
+        let Some(next) = next else { continue };
+        let b = arrival(world, &next);
+        let squeeze = 1.0 / (chain.index * chain.index);
+        let out = Outgoing {
+            direction: sample.direction,
+            pdf: sample.pdf.value(),
+            throughput: chain.throughput,
+            forward: chain.forward,
+            reverse: chain.reverse,
+            squeeze,
+            passages: chain.passages,
+        };
+        push(a, out);
+        push(b, Outgoing::default());
+        let rivals = Rivals::First { light_density: 1.0, next_event_pdf: 0.0, is_delta: false };
+        let pdf = next.vertex.bsdf.continuous_pdf(b.wo, b.wo).0;
+        let photon =
+            Photon { flux: Vec3::ONE, bounces: 0, rivals, camera_choices: 1.0, direction: b.wo, pdf };
+        light.arrivals.push(Arrival { goes_on: true, ..b });
+        light.photons.push(photon);
+        light.arrivals.push(Arrival { wo: sample.direction, goes_on: false, ..a });
+        let rivals = Rivals::Later { light_choices: chain.reverse, squeeze: 1.0 / squeeze };
+        light.photons.push(Photon { bounces: 1, rivals, camera_choices: chain.forward, pdf: 0.0, ..photon });
+    }
+    (camera, light)
+}
+
+#[test]
+fn the_weights_of_all_techniques_sum_to_one() {
+    for wall in [
+        r#"{"surface":{"type":"diffuse","color":0.6}}"#,
+        r#"{"surface":{"type":"glossy","color":0.8,"roughness":0.4}}"#,
+    ] {
+        let world = room(wall);
+        let (camera, light) = both_ways(&world, 4000);
+        let sensor = Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40);
+        let grid = Grid::new(&sensor, 4.0, 3);
+        let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
+        let cut = Cut(&|| false);
+        let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
+        assert!(clusters.group(&world, &grid, all, &cut) && clusters.measure(&world, &grid, all, true, &cut));
+        let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters };
+        assert!(weights.weigh(s, Estimator::LeaveOneOut, &cut));
+        let constants = segments(s, &weights);
+        let (mut checked, mut through_glass, mut shared) = (0, 0, 0);
+        for i in (0..camera.arrivals.len()).step_by(2) {
+            let n = camera.arrivals.len();
+            let (start, end) = (s.cluster_of(i), s.cluster_of(i + 1));
+            // parts of pairwise clusters are drawn at random, so the twins may have been parted
+            if clusters.of[n + i + 1] != clusters.of[i] || clusters.of[n + i] != clusters.of[i + 1] {
+                continue;
+            }
+            let own = camera.arrivals[i + 1].survival * light.photons[i].pdf;
+            let segment = &constants[i];
+            let p_light = weights.densities[clusters.place[i + 1] as usize].light;
+            // the light path itself is left out both ways
+            let camera_weight = segment.camera / (segment.camera + segment.light * (p_light - own).max(0.0));
+            let light_weight = photon_value(s, &weights, i + 1).x * start.area;
+            let sum = camera_weight + light_weight;
+            assert!((sum - 1.0).abs() < 2e-4, "{wall}, {i}: {camera_weight} + {light_weight}");
+            // and with the light path itself among the techniques
+            let all = segment.camera + segment.light * p_light;
+            let carried = segment.carry / camera.outgoing[i].throughput * all;
+            assert!((carried - Vec3::ONE).abs().max_element() < 1e-4, "{carried}");
+            checked += 1;
+            through_glass += u32::from(camera.outgoing[i].passages > 0);
+            shared += u32::from(end.lights > 1);
+        }
+        assert!(checked > 500 && through_glass > 50 && shared > 100, "{checked} {through_glass} {shared}");
+    }
+}
