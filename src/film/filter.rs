@@ -59,6 +59,25 @@ impl Filter {
                 FilterKind::BlackmanHarris => Vec2::new(blackman_harris(u.x), blackman_harris(u.y)),
             }
     }
+
+    /// Density with which [`Filter::sample`] draws an offset, per square pixel: the weight with which what falls
+    /// there counts for the pixel.
+    #[inline]
+    pub fn density(&self, offset: Vec2) -> f32 {
+        let one = |x: f32| match (x + self.radius) / (2.0 * self.radius) {
+            // half open, so that boxes side by side share no point
+            t if !(0.0..1.0).contains(&t) => 0.0,
+            t => match self.kind {
+                FilterKind::Box => 1.0,
+                FilterKind::BlackmanHarris => {
+                    let cell = ((t * CELLS as f32) as usize).min(CELLS - 1);
+                    let cdf = &*BLACKMAN_HARRIS_CDF;
+                    (cdf[cell + 1] - cdf[cell]) * CELLS as f32
+                }
+            },
+        };
+        one(offset.x) * one(offset.y) / (2.0 * self.radius).powi(2)
+    }
 }
 
 /// Cells of the table below: narrow enough that a picture cannot tell a constant density inside one from
@@ -167,6 +186,32 @@ mod tests {
             assert!(at(u) >= last);
             last = at(u);
             assert!((at(u) + at(1.0 - u)).abs() < 1e-3 * 1.5 || !(0.001..0.999).contains(&u));
+        }
+    }
+
+    #[test]
+    fn the_density_is_that_of_the_samples() {
+        for filter in [
+            Filter::new(FilterKind::Box, 0.0).unwrap(),
+            Filter::new(FilterKind::Box, 2.5).unwrap(),
+            Filter::new(FilterKind::BlackmanHarris, 0.0).unwrap(),
+        ] {
+            let (n, r) = (400, filter.radius());
+            let at = |k: u32| ((k as f32 + 0.5) / n as f32 * 2.4 - 1.2) * r;
+            let cell = (2.4 * r / n as f32).powi(2);
+            let moment = |f: &dyn Fn(f32) -> f32| -> f32 {
+                (0..n)
+                    .map(|i| (0..n).map(|j| filter.density(Vec2::new(at(i), at(j)))).sum::<f32>() * f(at(i)))
+                    .sum()
+            };
+            approx::assert_relative_eq!(moment(&|_| 1.0) * cell, 1.0, max_relative = 1e-2);
+            let square = |x: f32| x * x;
+            let m = 100_000;
+            let drawn: f32 = (0..m)
+                .map(|i| square(filter.sample(Vec2::splat((i as f32 + 0.5) / m as f32)).x))
+                .sum::<f32>()
+                / m as f32;
+            approx::assert_relative_eq!(moment(&square) * cell, drawn, max_relative = 2e-2);
         }
     }
 

@@ -13,11 +13,12 @@ mod ray;
 mod sensor;
 mod surface;
 mod texture;
+mod visibility;
 mod world;
 
 pub use class::SurfaceClass;
 pub use light_ray::{LightRay, SourceDensity};
 pub use ray::{LightPoint, LightSample, Piece};
-pub use sensor::{CameraRay, Sensor};
+pub use sensor::{CameraRay, Sensor, SensorView};
 pub use surface::SurfacePoint;
 pub use world::{BuildCost, Shaded, Vertex, World, WorldError};

@@ -380,32 +380,4 @@ impl World {
             false => emission,
         }
     }
-
-    /// Share of light that comes through from a sampled light to a surface point. Adds the rays it takes
-    /// to `rays`.
-    pub fn transmittance(&self, from: &SurfacePoint, light: &LightSample, rays: &mut u64) -> Vec3 {
-        let mut ray = light.ray_from(&from.place);
-        *rays += 1;
-        if !self.needs.transparency {
-            return if self.accel.occluded(&ray) { Vec3::ZERO } else { Vec3::ONE };
-        }
-        let opaque = |instance, triangle| {
-            !self.materials.may_be_transparent(self.scene.material_index(instance, triangle))
-        };
-        // most shadow rays that are blocked are blocked by something opaque
-        if self.accel.occluded_where(&ray, &|h| opaque(h.instance, h.triangle)) {
-            return Vec3::ZERO;
-        }
-        let mut weight = Vec3::ONE;
-        while let Some(hit) = self.accel.closest(&ray) {
-            let p = SurfacePoint::new(&self.scene, &self.accel, &hit);
-            weight *= self.materials.transparency(p.material, &p.at);
-            if weight == Vec3::ZERO {
-                return weight;
-            }
-            *rays += 1;
-            ray = light.ray_from(&p.place);
-        }
-        weight
-    }
 }

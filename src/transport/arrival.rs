@@ -11,7 +11,7 @@ const SURVIVAL: [f32; 2] = [0.05, 0.98];
 
 /// Probability `q` with which a path goes on from a surface: the albedo of what is continuous, given that the
 /// segment ended there.
-fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
+pub fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
     let albedo = bsdf.continuous_albedo(wo).max_element() / end_probability;
     // false for NaN
     if albedo > SURVIVAL[0] { albedo.min(SURVIVAL[1]) } else { SURVIVAL[0] }
