@@ -3,12 +3,13 @@
 
 pub mod path;
 pub mod segment;
+pub mod vertices;
 
-use crate::film::{Film, Filter, Rect};
+use crate::film::{Film, Filter, Rect, Sample};
 use crate::math::Sampler;
 use crate::shading::{CameraRay, Sensor, World};
 use crate::transport::report::Report;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -137,4 +138,14 @@ pub trait Integrator: Send {
 
     /// Whether an iteration that is cut short leaves nothing in the film.
     fn is_all_or_nothing(&self) -> bool;
+}
+
+/// Adds light that was scattered `bounces` times on its way to the camera.
+fn record(sample: &mut Sample, bounces: u32, light: Vec3) {
+    sample.radiance += light;
+    match bounces {
+        0 => sample.emission += light,
+        1 => sample.direct += light,
+        _ => {}
+    }
 }

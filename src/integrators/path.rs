@@ -4,7 +4,7 @@
 //! light and by following the BSDF to one; both are weighted by the power heuristic (Veach 1997, section
 //! 9.2). Paths end by Russian roulette, which leaves the mean as it is, or where nothing is hit.
 
-use super::{Context, Integrator, IterationEnd};
+use super::{Context, Integrator, IterationEnd, record};
 use crate::film::{Sample, SharedTile};
 use crate::math::Sampler;
 use crate::shading::bsdf::{Bsdf, Walk};
@@ -221,15 +221,5 @@ impl PathWalk<'_, '_> {
         f * light.radiance
             * (weight * to_radiance / light.pdf)
             * world.transmittance(hit, &light, &mut self.rays)
-    }
-}
-
-/// Adds light that was scattered `bounces` times on its way to the camera.
-fn record(sample: &mut Sample, bounces: u32, light: Vec3) {
-    sample.radiance += light;
-    match bounces {
-        0 => sample.emission += light,
-        1 => sample.direct += light,
-        _ => {}
     }
 }

@@ -8,9 +8,11 @@ pub mod statistics;
 use crate::film::{Film, FilmError, Rect};
 use crate::integrators::path::Path;
 use crate::integrators::segment::Segment;
+use crate::integrators::vertices::Vertices;
 use crate::integrators::{Context, Counters, Integrator, IterationEnd, StopSign};
 use crate::scene::{Scene, SceneError};
 use crate::shading::{BuildCost, Sensor, World, WorldError};
+use crate::transport::Techniques;
 use clock::Stopwatch;
 use serde::Serialize;
 use settings::{Method, Settings};
@@ -166,9 +168,15 @@ impl Session {
     /// Renders until a limit is reached or it is cancelled. Run again, it starts from where it stopped,
     /// with its time limit anew.
     pub fn run(&self, events: &mut dyn Events) -> Result<StopReason, SessionError> {
+        let Techniques { kernel, light_paths, .. } = self.settings.techniques;
         let mut integrator: Box<dyn Integrator> = match self.settings.method {
             Method::Path => Box::new(Path),
             Method::Segment => Box::new(Segment::new(self.settings.techniques)),
+            Method::Light => Box::new(Vertices::light_tracing(light_paths)),
+            Method::Bdpt => Box::new(Vertices::bidirectional(light_paths)),
+            Method::Ppm => Box::new(Vertices::photon_mapping(kernel, light_paths)),
+            Method::Bpm => Box::new(Vertices::bidirectional_photon_mapping(kernel, light_paths)),
+            Method::Vcm => Box::new(Vertices::connection_and_merging(kernel, light_paths)),
         };
         locked(&self.state).stop_reason = StopReason::Running;
         let watch = Stopwatch::start();

@@ -14,9 +14,33 @@ pub enum Method {
     Segment,
     /// Unidirectional path tracing with next-event estimation.
     Path,
+    /// Light tracing.
+    Light,
+    /// Bidirectional path tracing.
+    Bdpt,
+    /// Progressive photon mapping.
+    Ppm,
+    /// Bidirectional photon mapping.
+    Bpm,
+    /// Vertex connection and merging.
+    Vcm,
 }
 
-/// How the kernel of the segment method changes.
+impl Method {
+    /// Light paths for each camera path, where nothing is said.
+    fn light_paths(self) -> f32 {
+        match self {
+            Self::Segment | Self::Path => Techniques::default().light_paths,
+            Self::Light | Self::Bdpt | Self::Ppm | Self::Bpm | Self::Vcm => 1.0,
+        }
+    }
+
+    fn needs_light_paths(self) -> bool {
+        !matches!(self, Self::Segment | Self::Path)
+    }
+}
+
+/// How the kernel of the methods that have one changes.
 #[derive(Clone, Copy, Debug, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 enum KernelName {
@@ -41,7 +65,7 @@ pub struct Settings {
     pub source: String,
     /// How light transport is computed.
     pub method: Method,
-    /// What the segment method samples.
+    /// What the segment method samples; kernel and light paths are those of the others, too.
     pub techniques: Techniques,
     /// Width and height of the full film.
     pub resolution: [u32; 2],
@@ -84,7 +108,7 @@ struct Json {
     kernel: KernelName,
     kernel_size: f32,
     kernel_alpha: f32,
-    light_paths: f32,
+    light_paths: Option<f32>,
     next_event: bool,
     camera_paths: bool,
     resolution: [u32; 2],
@@ -111,7 +135,7 @@ impl Default for Json {
             kernel: KernelName::default(),
             kernel_size: techniques.kernel.start,
             kernel_alpha: DEFAULT_ALPHA,
-            light_paths: techniques.light_paths,
+            light_paths: None,
             next_event: techniques.next_event,
             camera_paths: techniques.camera_paths,
             resolution: [0, 0],
@@ -137,6 +161,10 @@ impl Json {
             v if (low..=high).contains(&v) => Ok(v),
             v => Err(format!("settings: {what} is {v}, not in [{low}, {high}]")),
         };
+        let light_paths = self.light_paths.unwrap_or(self.integrator.light_paths());
+        if light_paths == 0.0 && self.integrator.needs_light_paths() {
+            return Err("settings: light_paths is 0, and this integrator cannot do without".into());
+        }
         let alpha = within("kernel_alpha", self.kernel_alpha, 0.01, 0.99)?;
         let techniques = Techniques {
             estimator: match self.estimator {
@@ -150,7 +178,7 @@ impl Json {
                     KernelName::Progressive => Shrinking::Progressive { alpha },
                 },
             },
-            light_paths: within("light_paths", self.light_paths, 0.0, 64.0)?,
+            light_paths: within("light_paths", light_paths, 0.0, 64.0)?,
             next_event: self.next_event,
             camera_paths: self.camera_paths,
         };
@@ -240,6 +268,7 @@ mod tests {
             (r#"{"resolution":[4,4],"samples":1,"spp":1}"#, "spp"),
             (r#"{"resolution":[4,4],"samples":1,"kernel_size":0}"#, "kernel_size"),
             (r#"{"resolution":[4,4],"samples":1,"light_paths":-1}"#, "light_paths"),
+            (r#"{"resolution":[4,4],"samples":1,"light_paths":0,"integrator":"vcm"}"#, "light_paths"),
             (
                 r#"{"resolution":[4,4],"samples":1,"light_paths":0,"next_event":false,"camera_paths":false}"#,
                 "nothing is sampled",

@@ -45,17 +45,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="the picture; a .png is written in addition to an .exr beside it, tonemapped "
         f"({TONEMAPPING}). With --frames the number replaces #### or %%04d",
     )
-    add("--integrator", metavar="NAME", help="method: segment (default) or path")
+    add("--integrator", metavar="NAME", help="method: segment (default), path, light, bdpt, ppm, bpm or vcm")
     add(
         "--kernel",
         choices=("progressive", "fixed"),
-        help="whether the kernel of the segment method shrinks (default) or stays",
+        help="whether the kernel shrinks (default) or stays, for methods that have one",
     )
     add(
         "--kernel-size",
         type=arguments.positive,
         metavar="PIXELS",
-        help="edge of the segment method's kernel in the first iteration (default: 4)",
+        help="edge of the kernel in the first iteration (default: 4)",
     )
     add(
         "--estimator",

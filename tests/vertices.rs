@@ -1,0 +1,273 @@
+//! Light tracing, bidirectional path tracing, photon mapping and their union beside the path tracer.
+
+mod common;
+
+use common::{Stage, assert_close, icosphere, mean};
+use glam::{DMat4, DVec3, Vec3};
+use segue::film::Pass;
+
+/// The light of a scene by some settings: mean of a pass and its standard error, from renders of different seeds.
+fn estimate(s: &Stage, side: u32, samples: u32, pass: Pass, settings: &str) -> (f64, f64) {
+    const SEEDS: u32 = 4;
+    let means: Vec<f64> = (0..SEEDS)
+        .map(|seed| {
+            let json = format!(r#","seed":{seed},"passes":["{}"]{settings}"#, pass.name());
+            let session = s.render(side, samples, &json);
+            assert_eq!(session.film().rejected_samples(), 0, "{settings}");
+            mean(&session, pass)
+        })
+        .collect();
+    let n = f64::from(SEEDS);
+    let m = means.iter().sum::<f64>() / n;
+    let variance = means.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0);
+    (m, (variance / n).sqrt())
+}
+
+/// Asserts that two estimates agree, but for `slack` (relative) that merging may leave.
+fn assert_agree(what: &str, (a, sa): (f64, f64), (b, sb): (f64, f64), slack: f64) {
+    let sigma = sa.hypot(sb);
+    let apart = 100.0 * (a / b - 1.0);
+    println!("{what}: {apart:.2} % apart, {:.2} % standard error", 100.0 * sigma / b);
+    assert!(
+        (a - b).abs() <= 4.5 * sigma + slack * b.abs(),
+        "{what}: {a} +- {sa} against {b} +- {sb}, {apart:.2} % apart"
+    );
+    assert!(sigma < 0.025 * b.abs(), "{what}: too noisy to say anything, {sa} and {sb} of {b}");
+}
+
+const PATH: &str = r#","integrator":"path""#;
+/// Methods, and the relative error that merging within a small fixed radius may leave.
+type Methods<'a> = &'a [(&'a str, f64)];
+const ALL: Methods = &[("light", 0.0), ("bdpt", 0.0), ("ppm", 5e-3), ("bpm", 5e-3), ("vcm", 5e-3)];
+/// Those that find what is seen through mirrors and glass.
+const COMPLETE: Methods = &[("bdpt", 0.0), ("ppm", 5e-3), ("bpm", 5e-3), ("vcm", 5e-3)];
+/// Those that do not darken at edges, or hardly.
+const SHARP: Methods = &[("light", 0.0), ("bdpt", 0.0), ("vcm", 5e-3)];
+
+/// Renders by each of some methods and compares with path tracing; `more` goes to both.
+fn compare(what: &str, s: &Stage, methods: Methods, size: (u32, u32), more: &str) {
+    compare_pass(what, s, methods, size, Pass::Combined, more);
+}
+
+fn compare_pass(
+    what: &str,
+    s: &Stage,
+    methods: Methods,
+    (side, samples): (u32, u32),
+    pass: Pass,
+    more: &str,
+) {
+    let reference = estimate(s, side, 2 * samples, pass, &format!("{PATH}{more}"));
+    for &(method, slack) in methods {
+        let settings =
+            format!(r#","integrator":"{method}","kernel":"fixed","kernel_size":1,"light_paths":3{more}"#);
+        let got = estimate(s, side, samples, pass, &settings);
+        assert_agree(&format!("{method}, {what}"), got, reference, slack);
+    }
+}
+
+/// A quad between four corners, counter-clockwise seen from where it faces.
+fn quad(s: &mut Stage, corners: [[f32; 3]; 4], material: u32) {
+    let mesh = s.mesh(&corners.map(Vec3::from), &[0, 1, 2, 0, 2, 3], None);
+    s.place(mesh, material, DMat4::IDENTITY);
+}
+
+/// A ball of facets, with smoothed normals or its own. Light that a smoothed facet sends below the horizon of its
+/// shading normal is found from the camera alone.
+fn ball(s: &mut Stage, material: &str, is_smooth: bool) {
+    let material = s.material(material);
+    let (points, triangles) = icosphere(3);
+    let mesh = s.mesh(&points, &triangles, is_smooth.then_some(&points));
+    let at = DMat4::from_translation(DVec3::new(0.2, 0.1, 0.5)) * DMat4::from_scale(DVec3::splat(0.45));
+    s.place(mesh, material, at);
+}
+
+/// A corner of a room, open to the camera's side, and a ball in it.
+fn corner(ball_material: &str, wall: &str, is_smooth: bool) -> Stage {
+    let mut s = Stage::default();
+    let wall = s.material(wall);
+    quad(&mut s, [[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]], wall);
+    quad(&mut s, [[-1., 1., 0.], [1., 1., 0.], [1., 1., 2.], [-1., 1., 2.]], wall);
+    quad(&mut s, [[-1., -1., 0.], [-1., 1., 0.], [-1., 1., 2.], [-1., -1., 2.]], wall);
+    quad(&mut s, [[-1., -1., 2.], [-1., 1., 2.], [1., 1., 2.], [1., -1., 2.]], wall);
+    ball(&mut s, ball_material, is_smooth);
+    s.camera(DVec3::new(0.6, -3.0, 1.3), DVec3::new(0.0, 0.0, 0.8), 0.4, "");
+    s
+}
+
+/// A ball over a floor that fills the picture: no edges, where photon mapping darkens.
+fn yard(ball_material: &str, floor: &str) -> Stage {
+    let mut s = Stage::default();
+    let floor = s.material(floor);
+    quad(&mut s, [[-1.5, -1.2, 0.], [1.5, -1.2, 0.], [1.5, 2.4, 0.], [-1.5, 2.4, 0.]], floor);
+    ball(&mut s, ball_material, false);
+    yard_camera(&mut s, 0.25, "");
+    s
+}
+
+fn yard_camera(s: &mut Stage, half_window: f64, more: &str) {
+    s.camera(DVec3::new(0.3, -2.2, 2.6), DVec3::new(0.0, 0.0, 0.3), half_window, more);
+}
+
+const WALL: &str = r#"{"surface":{"type":"diffuse","color":[0.7,0.6,0.5]}}"#;
+const GLASS: &str = r#"{"surface":{"type":"glass","ior":1.5}}"#;
+const LAYERED: &str = r#"{"surface":{"type":"principled","base_color":[0.8,0.3,0.2],"roughness":0.4,
+    "coat":0.5,"coat_roughness":0.3}}"#;
+const DOME: &str = r#"{"type":"dome","radiance":[0.2,0.3,0.4]}"#;
+
+/// A light of this kind and these numbers, where a room has its ceiling.
+fn at_ceiling(light: &str) -> String {
+    format!(r#"{{{light},"transform":[1,0,0,0,0,1,0,-0.1,0,0,1,1.85,0,0,0,1]}}"#)
+}
+
+fn rect() -> String {
+    at_ceiling(r#""type":"rect","width":0.6,"height":0.6,"radiance":[5,5,5]"#)
+}
+
+/// A large lamp, so that the path tracer finds it through glass.
+fn lamp(s: &mut Stage) {
+    let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
+    quad(s, [[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
+}
+
+#[test]
+fn a_diffuse_room_agrees() {
+    let mut s = corner(WALL, WALL, false);
+    s.light(&rect());
+    s.light(DOME);
+    compare("diffuse room", &s, SHARP, (32, 64), "");
+    compare("wide filter", &s, SHARP, (32, 48), r#","filter":"blackman-harris""#);
+    compare("crop", &s, &SHARP[..2], (48, 48), r#","crop":[10,8,30,34],"filter":"blackman-harris""#);
+}
+
+#[test]
+fn glossy_and_layered_surfaces_agree() {
+    let glossy = r#"{"surface":{"type":"glossy","color":0.8,"roughness":0.35}}"#;
+    let frosted = r#"{"surface":{"type":"glass","ior":1.4,"roughness":0.5}}"#;
+    let sheet = r#"{"surface":{"type":"add","a":{"type":"diffuse","color":0.4},
+        "b":{"type":"translucent","color":0.4}}}"#;
+    for (ball, wall) in [(LAYERED, WALL), (glossy, LAYERED), (frosted, WALL), (sheet, glossy)] {
+        let mut s = corner(ball, wall, true);
+        s.light(&rect());
+        s.light(DOME);
+        compare(&format!("{ball}, {wall}"), &s, &SHARP[1..], (24, 48), "");
+        let mut s = yard(ball, wall);
+        s.light(&rect());
+        compare(&format!("yard, {ball}, {wall}"), &s, ALL, (24, 48), "");
+    }
+}
+
+/// Paths choose between a continuous lobe and one that is none.
+#[test]
+fn surfaces_that_are_mirrors_in_part_agree() {
+    let half = r#"{"surface":{"type":"mix","factor":0.4,"a":{"type":"diffuse","color":0.7},
+        "b":{"type":"glossy","color":0.9,"roughness":0}}}"#;
+    let mut s = yard(half, half);
+    lamp(&mut s);
+    s.light(DOME);
+    compare("half mirrors", &s, COMPLETE, (24, 48), "");
+}
+
+#[test]
+fn every_light_agrees() {
+    let tilted = r#""transform":[1,0,0,0,0,0.6,-0.8,0,0,0.8,0.6,0,0,0,0,1]"#;
+    for light in [
+        at_ceiling(r#""type":"disk","radius":0.3,"radiance":[5,5,5]"#),
+        at_ceiling(r#""type":"sphere","radius":0.1,"radiance":[9,9,9]"#),
+        at_ceiling(r#""type":"cylinder","radius":0.05,"length":0.7,"radiance":[9,9,9]"#),
+        at_ceiling(r#""type":"point","intensity":[0.5,0.5,0.5]"#),
+        at_ceiling(
+            r#""type":"point","intensity":[0.5,0.5,0.5],"shaping":{"cone_angle":50,"cone_softness":0.3}"#,
+        ),
+        format!(r#"{{"type":"distant","irradiance":[1,1,1],"angle":3,{tilted}}}"#),
+        format!(r#"{{"type":"distant","irradiance":[1,1,1],"angle":0,{tilted}}}"#),
+        DOME.into(),
+    ] {
+        let mut s = yard(WALL, WALL);
+        s.light(&light);
+        compare(&light, &s, ALL, (24, 32), "");
+    }
+    let mut s = yard(WALL, WALL);
+    lamp(&mut s);
+    compare("lamp of triangles", &s, ALL, (24, 32), "");
+}
+
+#[test]
+fn every_camera_agrees() {
+    for (more, half) in [
+        (r#","aperture_radius":0.15,"focus_distance":2.5,"blades":5,"aperture_ratio":1.5"#, 0.25),
+        (r#","type":"orthographic""#, 0.8),
+        (r#","type":"orthographic","aperture_radius":0.1,"focus_distance":2.5"#, 0.8),
+        (r#","near":2.6,"far":3.5"#, 0.25),
+    ] {
+        let mut s = yard(WALL, WALL);
+        s.light(&rect());
+        yard_camera(&mut s, half, more);
+        compare(more, &s, ALL, (24, 48), "");
+    }
+}
+
+#[test]
+fn half_transparent_surfaces_agree() {
+    let half = r#"{"surface":{"type":"diffuse","color":0.7},"opacity":0.5}"#;
+    let mut s = yard(half, half);
+    s.light(&rect());
+    compare("cut-outs", &s, ALL, (24, 48), "");
+    let tinted = r#"{"surface":{"type":"mix","factor":0.5,"a":{"type":"diffuse","color":0.7},
+        "b":{"type":"transparent","color":[0.9,0.5,0.2]}}}"#;
+    let mut s = corner(tinted, WALL, false);
+    s.light(&rect());
+    compare("tinted", &s, SHARP, (24, 48), "");
+}
+
+#[test]
+fn bounces_are_counted_as_in_path_tracing() {
+    let mut s = corner(WALL, WALL, false);
+    s.light(&rect());
+    s.light(DOME);
+    for depth in 0..4 {
+        let limit = format!(r#","max_depth":{depth}"#);
+        compare(&format!("at most {depth} bounces"), &s, SHARP, (24, 48), &limit);
+    }
+    let mut s = yard(GLASS, WALL);
+    lamp(&mut s);
+    for depth in 1..5 {
+        let limit = format!(r#","max_depth":{depth}"#);
+        compare(&format!("at most {depth} bounces, glass"), &s, COMPLETE, (24, 48), &limit);
+    }
+}
+
+/// Through glass, and with it the passes.
+#[test]
+fn passes_agree() {
+    let mut s = corner(GLASS, WALL, true);
+    s.light(DOME);
+    lamp(&mut s);
+    for pass in [Pass::Combined, Pass::Emission, Pass::Direct, Pass::Indirect, Pass::Alpha] {
+        let more = r#","transparent_background":true"#;
+        compare_pass(pass.name(), &s, &SHARP[1..], (32, 48), pass, more);
+    }
+}
+
+/// In a closed room of glowing walls radiance is `emission / (1 - albedo)` everywhere, on flat facets and on smoothed
+/// ones; where facets meet merging loses a little.
+#[test]
+fn furnaces_stay_even() {
+    for is_smooth in [false, true] {
+        let mut s = Stage::default();
+        let (points, triangles) = icosphere(3);
+        let mesh = s.mesh(&points, &triangles, is_smooth.then_some(&points));
+        let wall = s.material(
+            r#"{"surface":{"type":"add","a":{"type":"emission","strength":0.3},
+                "b":{"type":"diffuse","color":0.6}}}"#,
+        );
+        s.place(mesh, wall, DMat4::from_scale(DVec3::new(3.0, 2.0, 2.5)));
+        s.camera(DVec3::new(0.4, -0.7, 0.2), DVec3::new(-0.3, 0.5, 0.1), 0.5, "");
+        for (method, slack) in ALL {
+            let settings = format!(r#","integrator":"{method}","kernel_size":2"#);
+            let got = mean(&s.render(16, 256, &settings), Pass::Combined);
+            println!("furnace by {method}: {got}");
+            assert_close(&format!("furnace by {method}"), got, 0.75, 3e-3 + 2.0 * slack);
+        }
+    }
+}
