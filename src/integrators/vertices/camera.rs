@@ -110,13 +110,11 @@ impl CameraSampler<'_> {
     fn first(&self, ray: &CameraRay, chain: &Chain, end: &End) -> Sum {
         let rules = &self.rules;
         let place = &end.hit.place;
-        let mut fixed = rules.eta(place.position);
-        if rules.connects && chain.passages == 0 {
+        let seen = (rules.connects && chain.passages == 0).then(|| {
             let cos = place.normal.dot(end.wo).abs();
-            let made = rules.sensor.density(ray, place.position) * cos * chain.forward;
-            fixed += rules.light_paths / made;
-        }
-        Sum { fixed, slope: 0.0 }
+            rules.sensor.density(ray, place.position) * cos
+        });
+        Sum::from_lens(chain, seen, rules.light_paths, rules.eta(place.position))
     }
 
     /// Light that reaches the vertex from a drawn point of a light.

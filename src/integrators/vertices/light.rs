@@ -150,22 +150,19 @@ fn first(rules: &Rules, ray: &LightRay, chain: &Chain, end: &End) -> Sum {
     if !rules.connects {
         return Sum { fixed: merged, slope: 0.0 };
     }
-    let unbroken = chain.passages == 0;
     let cos = place.normal.dot(end.wo).abs();
-    let drawn = || match unbroken {
-        true => rules.world.pdf_of_sampling_ray(&end.hit.receiver(&end.vertex.bsdf, end.wo), ray),
-        false => 0.0,
+    let drawn = match chain.passages {
+        0 => rules.world.pdf_of_sampling_ray(&end.hit.receiver(&end.vertex.bsdf, end.wo), ray),
+        _ => 0.0,
     };
-    let across = match ray.density {
-        SourceDensity::Extended(pdf) => {
-            let made = pdf.0 * chain.forward;
-            let squeeze = 1.0 / (chain.index * chain.index);
-            return Sum { fixed: merged + drawn() / (cos * made), slope: chain.reverse * squeeze / made };
+    match ray.density {
+        SourceDensity::Extended(pdf) => Sum::from_light(chain, pdf.0, drawn / cos, false, merged),
+        SourceDensity::Point(pdf) => {
+            let across = pdf.to_area(place.position.distance(ray.origin()), 1.0).0;
+            Sum::from_light(chain, across * cos, drawn, true, merged)
         }
-        SourceDensity::Point(pdf) => pdf.to_area(place.position.distance(ray.origin()), 1.0).0,
-        SourceDensity::Beam(pdf) => pdf.0,
-    };
-    Sum { fixed: merged + drawn() / (across * cos * chain.forward), slope: 0.0 }
+        SourceDensity::Beam(across) => Sum::from_light(chain, across.0 * cos, drawn, true, merged),
+    }
 }
 
 /// What a vertex sends to the lens, and where on the full film it is seen.

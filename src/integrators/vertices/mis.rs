@@ -48,6 +48,23 @@ impl Sum {
         if density > 0.0 { self.fixed + density * self.slope } else { self.fixed }
     }
 
+    /// At the first vertex of a light path, made with the density `emitted`, per étendue where the light begins,
+    /// while next-event estimation would have `drawn` it; both per area of the vertex for delta lights, which
+    /// camera paths cannot meet.
+    pub fn from_light(chain: &Chain, emitted: f32, drawn: f32, is_delta: bool, merged: f32) -> Self {
+        let squeeze = 1.0 / (chain.index * chain.index);
+        let made = emitted * chain.forward;
+        let slope = if is_delta { 0.0 } else { chain.reverse * squeeze / made };
+        Self { fixed: merged + drawn / made, slope }
+    }
+
+    /// At the first vertex of a camera path. `seen`: density of camera rays per area there, where light paths may
+    /// be connected to the lens.
+    pub fn from_lens(chain: &Chain, seen: Option<f32>, light_paths: f32, merged: f32) -> Self {
+        let connected = seen.map_or(0.0, |density| light_paths / (density * chain.forward));
+        Self { fixed: merged + connected, slope: 0.0 }
+    }
+
     /// After one more segment. `connected`: the density `P G` of its end if a connection along it is a
     /// technique. `merged`: `eta` of its end.
     pub fn after(turn: &Turn, chain: &Chain, connected: Option<f32>, merged: f32) -> Self {
@@ -102,4 +119,182 @@ pub fn meeting(camera: &Turn, chain: &Chain, drawn: f32, emitted: f32) -> f32 {
 #[inline]
 pub fn merging(light: f32, camera: f32, eta: f32) -> f32 {
     weight((light + camera) / eta - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sampler::hash_unit;
+    use glam::Vec3;
+
+    /// A path with random densities. Segment `k` ends at vertex `k`; element 0 of the segments is unused.
+    struct Path {
+        /// Last vertex, the lens.
+        n: usize,
+        light: Vec<Chain>,
+        camera: Vec<Chain>,
+        /// Geometry terms towards the camera; towards the light they are over the squared ratio of indices.
+        geometry: Vec<f32>,
+        /// Densities with which light and camera paths are scattered on at each vertex.
+        onward: [Vec<f32>; 2],
+        /// Probabilities with which each kind of path ends its segment there.
+        ends: [Vec<f32>; 2],
+        eta: Vec<f32>,
+        emitted: f32,
+        drawn: f32,
+        is_delta: bool,
+        seen: f32,
+        light_paths: f32,
+    }
+
+    impl Path {
+        fn random(seed: u32) -> Self {
+            let mut count = 0;
+            let mut random = |low: f32, high: f32| {
+                count += 1;
+                low * (high / low).powf(hash_unit(seed, count))
+            };
+            let n = 2 + (seed % 5) as usize;
+            let mut numbers = |low, high| (0..=n).map(|_| random(low, high)).collect::<Vec<f32>>();
+            let (geometry, eta) = (numbers(0.1, 10.0), numbers(0.01, 10.0));
+            let onward = [numbers(0.1, 5.0), numbers(0.1, 5.0)];
+            let mut ends = [numbers(0.2, 1.0), numbers(0.2, 1.0)];
+            // what is emitted is met before anything is chosen
+            ends[1][0] = 1.0;
+            let (choices, indices, broken) = (numbers(0.2, 1.0), numbers(0.5, 2.0), numbers(0.1, 10.0));
+            let reverse_choices = numbers(0.2, 1.0);
+            let (mut light, mut camera) = (Vec::new(), Vec::new());
+            for k in 0..=n {
+                let passages = if broken[k] > 2.0 { 1 } else { 0 };
+                let (forward, reverse, index) = match passages {
+                    0 => (1.0, 1.0, 1.0),
+                    _ => (choices[k], reverse_choices[k], indices[k]),
+                };
+                let one = Chain { throughput: Vec3::ONE, forward, reverse, index, passages };
+                light.push(Chain { forward: forward * ends[0][k], ..one });
+                let before = k.saturating_sub(1);
+                let back =
+                    Chain { forward: reverse * ends[1][before], reverse: forward, index: 1.0 / index, ..one };
+                camera.push(back);
+            }
+            let [emitted, drawn, seen] = [0; 3].map(|_| random(0.1, 5.0));
+            let light_paths = random(1.0, 50.0);
+            let is_delta = seed % 3 == 0;
+            Self {
+                n,
+                light,
+                camera,
+                geometry,
+                onward,
+                ends,
+                eta,
+                emitted,
+                drawn,
+                is_delta,
+                seen,
+                light_paths,
+            }
+        }
+
+        fn unbroken(&self, k: usize) -> bool {
+            self.light[k].passages == 0
+        }
+
+        fn back_geometry(&self, k: usize) -> f32 {
+            self.geometry[k] / self.light[k].index.powi(2)
+        }
+
+        /// Density of vertices `0..=k` made from the light.
+        fn from_light(&self, k: usize) -> f32 {
+            let first = if self.is_delta { 1.0 } else { self.geometry[1] };
+            let start = self.emitted * self.light[1].forward * first;
+            (2..=k).map(|i| self.onward[0][i - 1] * self.light[i].forward * self.geometry[i]).product::<f32>()
+                * start
+        }
+
+        /// Density of vertices `k..=n` made from the camera.
+        fn from_camera(&self, k: usize) -> f32 {
+            let step =
+                |i: usize| self.onward[1][i + 1] * self.camera[i + 1].forward * self.back_geometry(i + 1);
+            (k..self.n - 1).map(step).product::<f32>() * self.seen * self.camera[self.n].forward
+        }
+
+        /// Density of every technique from the definition, beside its weight by the carried sums.
+        fn techniques(&self) -> Vec<(f32, f32)> {
+            let n = self.n;
+            let mut found = Vec::new();
+            let mut light = vec![Sum::default(); n];
+            let drawn = if self.unbroken(1) { self.drawn } else { 0.0 };
+            light[1] = Sum::from_light(&self.light[1], self.emitted, drawn, self.is_delta, self.eta[1]);
+            let light_turn = |sums: &[Sum], k: usize| Turn {
+                onward: self.onward[0][k],
+                end_back: self.ends[1][k],
+                sum: sums[k].at(self.onward[1][k]),
+            };
+            for k in 2..n {
+                let turn = light_turn(&light, k - 1);
+                let g = self.unbroken(k).then(|| turn.onward * self.light[k].forward * self.geometry[k]);
+                light[k] = Sum::after(&turn, &self.light[k], g, self.eta[k]);
+            }
+            let mut camera = vec![Sum::default(); n];
+            let seen = self.unbroken(n).then_some(self.seen);
+            camera[n - 1] = Sum::from_lens(&self.camera[n], seen, self.light_paths, self.eta[n - 1]);
+            let camera_turn = |sums: &[Sum], k: usize| Turn {
+                onward: self.onward[1][k],
+                end_back: self.ends[0][k],
+                sum: sums[k].at(self.onward[0][k]),
+            };
+            for k in (1..n - 1).rev() {
+                let turn = camera_turn(&camera, k + 1);
+                let chain = &self.camera[k + 1];
+                let g = self.unbroken(k + 1).then(|| turn.onward * chain.forward * self.back_geometry(k + 1));
+                camera[k] = Sum::after(&turn, chain, g, self.eta[k]);
+            }
+
+            let first = camera_turn(&camera, 1);
+            if !self.is_delta {
+                let met = first.onward * self.camera[1].forward * self.back_geometry(1);
+                let weight = meeting(&first, &self.camera[1], drawn, self.emitted);
+                found.push((met * self.from_camera(1), weight));
+            }
+            if self.unbroken(1) {
+                let g = if self.is_delta { 1.0 } else { self.geometry[1] };
+                let weight = next_event(&first, self.drawn, self.emitted, self.is_delta);
+                found.push((self.drawn * g * self.from_camera(1), weight));
+            }
+            for k in (2..n).filter(|&k| self.unbroken(k)) {
+                let weight =
+                    connection(&light_turn(&light, k - 1), &camera_turn(&camera, k), self.geometry[k]);
+                found.push((self.from_light(k - 1) * self.from_camera(k), weight));
+            }
+            if self.unbroken(n) {
+                let weight = lens(&light_turn(&light, n - 1), self.seen, self.light_paths);
+                found.push((self.light_paths * self.from_light(n - 1), weight));
+            }
+            for k in 1..n {
+                let (a, b) = (light[k].at(self.onward[1][k]), camera[k].at(self.onward[0][k]));
+                let density = self.eta[k] * self.from_light(k) * self.from_camera(k);
+                found.push((density, merging(a, b, self.eta[k])));
+            }
+            found
+        }
+    }
+
+    /// On random paths, through chains or not, from lights of some extent or none: every weight is the
+    /// technique's share of the densities, so that they sum to one.
+    #[test]
+    fn weights_are_shares_of_the_densities() {
+        for seed in 0..2000 {
+            let path = Path::random(seed);
+            let techniques = path.techniques();
+            let all: f64 = techniques.iter().map(|t| f64::from(t.0)).sum();
+            let mut sum = 0.0;
+            for (density, weight) in techniques {
+                let share = f64::from(density) / all;
+                assert!((share - f64::from(weight)).abs() < 1e-4, "path {seed}: {weight} instead of {share}");
+                sum += f64::from(weight);
+            }
+            assert!((sum - 1.0).abs() < 1e-4, "path {seed}: {sum}");
+        }
+    }
 }
