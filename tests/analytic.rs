@@ -7,32 +7,49 @@ use glam::{DMat4, DVec3};
 use segue::film::Pass;
 use std::f64::consts::PI;
 
-/// Runs tests with path tracing, and with segments gathered over half a pixel: at that kernel what is left of
-/// the bias of filtering is within the tolerances.
-macro_rules! by_each_method {
-    ($($name:ident),* $(,)?) => {
-        mod path {
-            $(#[test] fn $name() { super::$name(r#","integrator":"path""#) })*
-        }
-        mod segment {
-            $(#[test] fn $name() {
-                super::$name(r#","integrator":"segment","kernel":"fixed","kernel_size":0.5"#)
-            })*
+/// Runs tests by methods with these settings.
+macro_rules! by_methods {
+    ($($module:ident $settings:literal),* => $names:tt) => {
+        $(by_methods!(@one $module $settings $names);)*
+    };
+    (@one $module:ident $settings:literal [$($name:ident),* $(,)?]) => {
+        mod $module {
+            $(#[test] fn $name() { super::$name($settings) })*
         }
     };
 }
 
-by_each_method!(
-    every_camera_sees_the_furnace,
-    furnaces_converge_for_high_albedo_too,
-    every_light_fills_the_integrating_sphere_by_its_flux,
-    emissive_meshes_are_lights,
-    infinite_lights_light_a_floor,
-    passes_say_what_is_seen,
-    cut_outs_and_transparent_surfaces_let_light_through,
-    glass_keeps_all_light,
-    the_same_seed_gives_the_same_picture_whatever_the_threads,
-    a_scene_far_from_the_origin_is_the_same_scene,
+// segments and merging over half a pixel: what is left of the bias of filtering is within the tolerances
+by_methods!(
+    path r#","integrator":"path""#,
+    segment r#","integrator":"segment","kernel":"fixed","kernel_size":0.5"#,
+    bdpt r#","integrator":"bdpt""#,
+    vcm r#","integrator":"vcm","kernel":"fixed","kernel_size":0.5"# =>
+    [
+        every_camera_sees_the_furnace,
+        furnaces_converge_for_high_albedo_too,
+        every_light_fills_the_integrating_sphere_by_its_flux,
+        emissive_meshes_are_lights,
+        infinite_lights_light_a_floor,
+        passes_say_what_is_seen,
+        cut_outs_and_transparent_surfaces_let_light_through,
+        glass_keeps_all_light,
+        the_same_seed_gives_the_same_picture_whatever_the_threads,
+        a_scene_far_from_the_origin_is_the_same_scene,
+    ]
+);
+
+// light paths alone seldom find what is small in a large scene: closed rooms only
+by_methods!(
+    light r#","integrator":"light","light_paths":2"#,
+    ppm r#","integrator":"ppm","light_paths":2"#,
+    bpm r#","integrator":"bpm","light_paths":2"# =>
+    [
+        every_camera_sees_the_furnace,
+        every_light_fills_the_integrating_sphere_by_its_flux,
+        emissive_meshes_are_lights,
+        the_same_seed_gives_the_same_picture_whatever_the_threads,
+    ]
 );
 
 /// A closed room with walls of this emission and albedo: radiance is `emission / (1 - albedo)`
