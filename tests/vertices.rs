@@ -60,7 +60,7 @@ fn compare_pass(
     let reference = estimate(s, side, 2 * samples, pass, &format!("{PATH}{more}"));
     for &(method, slack) in methods {
         let settings =
-            format!(r#","integrator":"{method}","kernel":"fixed","kernel_size":1,"light_paths":3{more}"#);
+            format!(r#","integrator":"{method}","kernel":"fixed","kernel_size":1,"light_paths":2{more}"#);
         let got = estimate(s, side, samples, pass, &settings);
         assert_agree(&format!("{method}, {what}"), got, reference, slack);
     }
@@ -150,7 +150,7 @@ fn glossy_and_layered_surfaces_agree() {
         let mut s = corner(ball, wall, true);
         s.light(&rect());
         s.light(DOME);
-        compare(&format!("{ball}, {wall}"), &s, &SHARP[1..], (24, 48), "");
+        compare(&format!("{ball}, {wall}"), &s, &SHARP[1..], (24, 32), "");
         let mut s = yard(ball, wall);
         s.light(&rect());
         compare(&format!("yard, {ball}, {wall}"), &s, ALL, (24, 48), "");
@@ -245,7 +245,7 @@ fn passes_agree() {
     lamp(&mut s);
     for pass in [Pass::Combined, Pass::Emission, Pass::Direct, Pass::Indirect, Pass::Alpha] {
         let more = r#","transparent_background":true"#;
-        compare_pass(pass.name(), &s, &SHARP[1..], (32, 48), pass, more);
+        compare_pass(pass.name(), &s, &SHARP[1..], (24, 48), pass, more);
     }
 }
 

@@ -179,7 +179,7 @@ mod tests {
             }
             let [emitted, drawn, seen] = [0; 3].map(|_| random(0.1, 5.0));
             let light_paths = random(1.0, 50.0);
-            let is_delta = seed % 3 == 0;
+            let is_delta = seed.is_multiple_of(3);
             Self {
                 n,
                 light,
@@ -205,7 +205,7 @@ mod tests {
         }
 
         /// Density of vertices `0..=k` made from the light.
-        fn from_light(&self, k: usize) -> f32 {
+        fn made_from_light(&self, k: usize) -> f32 {
             let first = if self.is_delta { 1.0 } else { self.geometry[1] };
             let start = self.emitted * self.light[1].forward * first;
             (2..=k).map(|i| self.onward[0][i - 1] * self.light[i].forward * self.geometry[i]).product::<f32>()
@@ -213,7 +213,7 @@ mod tests {
         }
 
         /// Density of vertices `k..=n` made from the camera.
-        fn from_camera(&self, k: usize) -> f32 {
+        fn made_from_camera(&self, k: usize) -> f32 {
             let step =
                 |i: usize| self.onward[1][i + 1] * self.camera[i + 1].forward * self.back_geometry(i + 1);
             (k..self.n - 1).map(step).product::<f32>() * self.seen * self.camera[self.n].forward
@@ -255,25 +255,25 @@ mod tests {
             if !self.is_delta {
                 let met = first.onward * self.camera[1].forward * self.back_geometry(1);
                 let weight = meeting(&first, &self.camera[1], drawn, self.emitted);
-                found.push((met * self.from_camera(1), weight));
+                found.push((met * self.made_from_camera(1), weight));
             }
             if self.unbroken(1) {
                 let g = if self.is_delta { 1.0 } else { self.geometry[1] };
                 let weight = next_event(&first, self.drawn, self.emitted, self.is_delta);
-                found.push((self.drawn * g * self.from_camera(1), weight));
+                found.push((self.drawn * g * self.made_from_camera(1), weight));
             }
             for k in (2..n).filter(|&k| self.unbroken(k)) {
                 let weight =
                     connection(&light_turn(&light, k - 1), &camera_turn(&camera, k), self.geometry[k]);
-                found.push((self.from_light(k - 1) * self.from_camera(k), weight));
+                found.push((self.made_from_light(k - 1) * self.made_from_camera(k), weight));
             }
             if self.unbroken(n) {
                 let weight = lens(&light_turn(&light, n - 1), self.seen, self.light_paths);
-                found.push((self.light_paths * self.from_light(n - 1), weight));
+                found.push((self.light_paths * self.made_from_light(n - 1), weight));
             }
             for k in 1..n {
                 let (a, b) = (light[k].at(self.onward[1][k]), camera[k].at(self.onward[0][k]));
-                let density = self.eta[k] * self.from_light(k) * self.from_camera(k);
+                let density = self.eta[k] * self.made_from_light(k) * self.made_from_camera(k);
                 found.push((density, merging(a, b, self.eta[k])));
             }
             found
