@@ -27,14 +27,6 @@ pub enum Method {
 }
 
 impl Method {
-    /// Light paths for each camera path, where nothing is said.
-    fn light_paths(self) -> f32 {
-        match self {
-            Self::Segment | Self::Path => Techniques::default().light_paths,
-            Self::Light | Self::Bdpt | Self::Ppm | Self::Bpm | Self::Vcm => 1.0,
-        }
-    }
-
     fn needs_light_paths(self) -> bool {
         !matches!(self, Self::Segment | Self::Path)
     }
@@ -108,7 +100,7 @@ struct Json {
     kernel: KernelName,
     kernel_size: f32,
     kernel_alpha: f32,
-    light_paths: Option<f32>,
+    light_paths: f32,
     next_event: bool,
     camera_paths: bool,
     resolution: [u32; 2],
@@ -135,7 +127,7 @@ impl Default for Json {
             kernel: KernelName::default(),
             kernel_size: techniques.kernel.start,
             kernel_alpha: DEFAULT_ALPHA,
-            light_paths: None,
+            light_paths: techniques.light_paths,
             next_event: techniques.next_event,
             camera_paths: techniques.camera_paths,
             resolution: [0, 0],
@@ -161,8 +153,7 @@ impl Json {
             v if (low..=high).contains(&v) => Ok(v),
             v => Err(format!("settings: {what} is {v}, not in [{low}, {high}]")),
         };
-        let light_paths = self.light_paths.unwrap_or(self.integrator.light_paths());
-        if light_paths == 0.0 && self.integrator.needs_light_paths() {
+        if self.light_paths == 0.0 && self.integrator.needs_light_paths() {
             return Err("settings: light_paths is 0, and this integrator cannot do without".into());
         }
         let alpha = within("kernel_alpha", self.kernel_alpha, 0.01, 0.99)?;
@@ -178,7 +169,7 @@ impl Json {
                     KernelName::Progressive => Shrinking::Progressive { alpha },
                 },
             },
-            light_paths: within("light_paths", light_paths, 0.0, 64.0)?,
+            light_paths: within("light_paths", self.light_paths, 0.0, 64.0)?,
             next_event: self.next_event,
             camera_paths: self.camera_paths,
         };
