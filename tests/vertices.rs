@@ -41,6 +41,8 @@ type Methods<'a> = &'a [(&'a str, f64)];
 const ALL: Methods = &[("light", 0.0), ("bdpt", 0.0), ("ppm", 5e-3), ("bpm", 5e-3), ("vcm", 5e-3)];
 /// Those that find what is seen through mirrors and glass.
 const COMPLETE: Methods = &[("bdpt", 0.0), ("ppm", 5e-3), ("bpm", 5e-3), ("vcm", 5e-3)];
+/// Those with every way to begin at a light or at a lens; `bpm` has those of `ppm`.
+const BEGINNINGS: Methods = &[("light", 0.0), ("bdpt", 0.0), ("ppm", 5e-3), ("vcm", 5e-3)];
 /// Those that do not darken at edges, or hardly.
 const SHARP: Methods = &[("light", 0.0), ("bdpt", 0.0), ("vcm", 5e-3)];
 
@@ -185,11 +187,11 @@ fn every_light_agrees() {
     ] {
         let mut s = yard(WALL, WALL);
         s.light(&light);
-        compare(&light, &s, ALL, (24, 16), "");
+        compare(&light, &s, BEGINNINGS, (24, 16), "");
     }
     let mut s = yard(WALL, WALL);
     lamp(&mut s);
-    compare("lamp of triangles", &s, ALL, (24, 16), "");
+    compare("lamp of triangles", &s, BEGINNINGS, (24, 16), "");
 }
 
 #[test]
@@ -203,7 +205,7 @@ fn every_camera_agrees() {
         let mut s = yard(WALL, WALL);
         s.light(&rect());
         yard_camera(&mut s, half, more);
-        compare(more, &s, ALL, (24, 24), "");
+        compare(more, &s, BEGINNINGS, (24, 24), "");
     }
 }
 
@@ -231,7 +233,7 @@ fn bounces_are_counted_as_in_path_tracing() {
     }
     let mut s = yard(GLASS, WALL);
     lamp(&mut s);
-    for depth in 1..5 {
+    for depth in [1, 2, 4] {
         let limit = format!(r#","max_depth":{depth}"#);
         compare(&format!("at most {depth} bounces, glass"), &s, COMPLETE, (24, 24), &limit);
     }
