@@ -45,7 +45,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="the picture; a .png is written in addition to an .exr beside it, tonemapped "
         f"({TONEMAPPING}). With --frames the number replaces #### or %%04d",
     )
-    add("--integrator", metavar="NAME", help="method: segment (default), path, light, bdpt, ppm, bpm or vcm")
+    add(
+        "--integrator",
+        metavar="NAME",
+        help="method: segment (default), path, light, bdpt, ppm, bpm or vcm",
+    )
     add(
         "--kernel",
         choices=("progressive", "fixed"),
