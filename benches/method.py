@@ -1,7 +1,9 @@
 """The figures of docs/method.md: gain over path tracing at equal processor time, and the mean against the kernel's size.
 
 Needs the scenes and references that are shared between renderers (SEGUE_SHARED, or ../shared beside the
-checkout); without them it says so and does nothing. Run: .venv/bin/python benches/method.py table|consistency
+checkout); without them it says so and does nothing. `pictures` needs none of it, but what
+`cargo test --release --test method_pictures -- --ignored` draws. Run:
+.venv/bin/python benches/method.py table|consistency|plot|pictures
 """
 
 from __future__ import annotations
@@ -13,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from segue import Render, images, metrics, usd
 
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers"
 SCENES = ("cornell", "cornell_glass", "ajar_door", "glossy_box", "lamp", "furnace")
+PICTURES = ROOT / "docs" / "pictures"
 #: Relative noise of the references' means, as far as other renderers tell.
 KNOWN_TO = {"ajar_door": 0.006, "lamp": 0.006}
 SECONDS = 20.0
@@ -56,7 +58,12 @@ def table() -> None:
                 scene, integrator=method, resolution=[256, 256], time=SECONDS, threads=2
             )
             error = metrics.errors(picture, reference)["relmse"]
-            found[method] = (stats["samples"], stats["cpu_seconds"], error, picture.mean())
+            found[method] = (
+                stats["samples"],
+                stats["cpu_seconds"],
+                error,
+                picture.mean(),
+            )
         (n, cpu, error, _), (ns, cpu_s, error_s, mean) = found["path"], found["segment"]
         gain = error * cpu / (error_s * cpu_s)
         off = mean / reference.mean() - 1.0
@@ -94,7 +101,80 @@ def consistency(seeds: int = 4, samples: int = 16) -> None:
                 print(json.dumps(row), flush=True)
 
 
+def plot() -> None:
+    """The output of `consistency`, from the standard input, as a picture."""
+    from matplotlib import pyplot
+
+    rows = [json.loads(line) for line in sys.stdin if line.strip()]
+    figure, axes = pyplot.subplots(
+        2, 3, figsize=(11, 6), sharex=True, constrained_layout=True
+    )
+    for axis, name in zip(axes.flat, SCENES, strict=True):
+        for what in SETS:
+            found = [r for r in rows if r["scene"] == name and r["techniques"] == what]
+            # a set that cannot find the paths says nothing
+            if (
+                not found
+                or min(r["mean"] for r in found) < 0.9
+                or found[-1]["error"] > 0.03
+            ):
+                continue
+            sizes, means = (
+                [r["kernel"] for r in found],
+                [100 * (r["mean"] - 1) for r in found],
+            )
+            bars = [100 * r["error"] for r in found]
+            axis.errorbar(
+                sizes, means, bars, label=what, marker="o", markersize=3, capsize=2
+            )
+        known = 100 * KNOWN_TO.get(name, 0.002)
+        axis.axhspan(-known, known, color="0.9")
+        axis.set(title=name, xscale="log", ylim=(-4, 4))
+        axis.set_xticks(SIZES, [f"{s:g}" for s in SIZES])
+        axis.minorticks_off()
+    figure.supxlabel("edge of a fixed kernel, pixels")
+    figure.supylabel("mean of the picture against the reference, %")
+    handles = {
+        h.get_label(): h for a in axes.flat for h in a.get_legend_handles_labels()[0]
+    }
+    figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
+    )
+    figure.savefig(PICTURES / "consistency.png", dpi=100)
+
+
+def pictures() -> None:
+    """Clusters, segments, and what one iteration makes of its samples."""
+    import matplotlib.image
+
+    drawn = ROOT / "target" / "method"
+    for names, into in (
+        (("clusters_1.ppm", "clusters_101.ppm"), "clusters.png"),
+        (("segments.ppm",), "segments.png"),
+    ):
+        parts = [matplotlib.image.imread(drawn / n) for n in names]
+        matplotlib.image.imsave(PICTURES / into, np.concatenate(parts, axis=1))
+    scene = usd.load(ROOT / "scenes" / "glass_caustic.usda").scene
+    steps = [
+        {"integrator": "path", "samples": 1},
+        {"kernel": "fixed", "kernel_size": 0.001, "samples": 1},
+        {"samples": 1},
+        {"samples": 64},
+    ]
+    shown = [render(scene, resolution=[320, 180], **step)[0] for step in steps]
+    rows = [np.concatenate(shown[k : k + 2], axis=1) for k in (0, 2)]
+    images.write_png(PICTURES / "stages.png", np.concatenate(rows, axis=0))
+
+
 if __name__ == "__main__":
-    if not (SHARED / "refs").is_dir():
+    command = sys.argv[1]
+    if command in ("table", "consistency") and not (SHARED / "refs").is_dir():
         sys.exit(f"skipped: {SHARED} does not exist")
-    {"table": table, "consistency": consistency}[sys.argv[1]]()
+    PICTURES.mkdir(exist_ok=True)
+    {"table": table, "consistency": consistency, "plot": plot, "pictures": pictures}[
+        command
+    ]()

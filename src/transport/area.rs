@@ -7,11 +7,13 @@ use crate::shading::{SurfaceClass, World};
 use glam::{Vec2, Vec3};
 
 /// Coverage points that have to lie on the cluster, where photons are divided by its area.
-pub const MANY_POINTS: u32 = 16;
+pub const MANY_POINTS: u32 = 8;
 /// The same where the area only decides how much each technique counts.
 pub const FEW_POINTS: u32 = 2;
 /// Most points that are tried to find them.
 const MOST_TRIES: u32 = 256;
+/// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
+const NEAR_PLANE: f32 = 0.05;
 /// Most surfaces that are looked at below one coverage point.
 const LAYERS: u32 = 64;
 
@@ -90,8 +92,12 @@ impl Cell<'_> {
             if n[axis] < 0.0 {
                 std::mem::swap(&mut top, &mut bottom);
             }
-            let mut is_there = false;
+            let (mut is_first, mut is_there) = (true, false);
             world.for_each_surface(top, bottom, LAYERS, |p| {
+                // where nothing divides the cluster, only what bends away or lies below something may be out of sight
+                let rise = (p.place.position - self.representative.position).dot(n);
+                let is_doubtful = self.parted.is_some() || !is_first || rise.abs() > NEAR_PLANE * edge;
+                is_first = false;
                 let class = world.class(p.material);
                 let ns = match class == SurfaceClass::Transmitting || p.ns.dot(n) > 0.0 {
                     true => p.ns,
@@ -100,7 +106,7 @@ impl Cell<'_> {
                 let there = class == self.representative.class
                     && self.grid.bin(ns) == bin
                     && self.grid.voxel(p.place.position) == self.voxel
-                    && hidden(p.place.position, ns) == self.parted.unwrap_or(false);
+                    && (!is_doubtful || hidden(p.place.position, ns) == self.parted.unwrap_or(false));
                 if there {
                     is_there = true;
                     // a surface seen edge-on would count without bound

@@ -239,8 +239,7 @@ fn area(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &Cluster,
     if !exact {
         return cell.plane_cut(point);
     }
-    let has_photons = c.lights > 0 && members.len() > 1;
-    let points = if has_photons { MANY_POINTS } else { FEW_POINTS };
+    let points = if c.cameras > 0 && c.lights > 0 { MANY_POINTS } else { FEW_POINTS };
     let hub = Hub::new(grid, representative);
     cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)))
         .unwrap_or_else(|| cell.coverage(world, point, points, &|p, n| hub.is_hidden(world, p, n)))
