@@ -168,10 +168,13 @@ impl Session {
     /// Renders until a limit is reached or it is cancelled. Run again, it starts from where it stopped,
     /// with its time limit anew.
     pub fn run(&self, events: &mut dyn Events) -> Result<StopReason, SessionError> {
-        let Techniques { kernel, light_paths, .. } = self.settings.techniques;
+        let techniques = self.settings.techniques;
+        let Techniques { kernel, light_paths, .. } = techniques;
         let mut integrator: Box<dyn Integrator> = match self.settings.method {
             Method::Path => Box::new(Path),
-            Method::Segment => Box::new(Segment::new(self.settings.techniques)),
+            Method::Segment => Box::new(Segment::new(techniques)),
+            Method::Mvf => Box::new(Segment::new(Techniques { light_paths: 0.0, ..techniques })),
+            Method::PhotonFilter => Box::new(Segment::new(Techniques { camera_paths: false, ..techniques })),
             Method::Light => Box::new(Vertices::light_tracing(light_paths)),
             Method::Bdpt => Box::new(Vertices::bidirectional(light_paths)),
             Method::Ppm => Box::new(Vertices::photon_mapping(kernel, light_paths)),

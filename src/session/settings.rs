@@ -12,6 +12,10 @@ pub enum Method {
     /// Segment-based light transport.
     #[default]
     Segment,
+    /// Its camera segments alone: multi-vertex filtering.
+    Mvf,
+    /// Its light segments, gathered where camera paths first arrive.
+    PhotonFilter,
     /// Unidirectional path tracing with next-event estimation.
     Path,
     /// Light tracing.
@@ -28,7 +32,7 @@ pub enum Method {
 
 impl Method {
     fn needs_light_paths(self) -> bool {
-        !matches!(self, Self::Segment | Self::Path)
+        !matches!(self, Self::Segment | Self::Mvf | Self::Path)
     }
 }
 

@@ -66,7 +66,7 @@ def test_difference_of_means_of_black():
 
 def test_methods_are_settings():
     assert methods.settings_of("segment") == {"integrator": "segment"}
-    assert methods.settings_of("mvf") == {"integrator": "segment", "light_paths": 0}
+    assert methods.settings_of("segment-fixed") == {"integrator": "segment", "kernel": "fixed"}
     assert methods.settings_of("vcm") == {"integrator": "vcm"}
 
 

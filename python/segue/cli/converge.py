@@ -42,7 +42,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         type=arguments.names,
         default=["segment", "path"],
         metavar="a,b,...",
-        help=f"{', '.join(methods.SEGMENT_METHODS)}, or any integrator (default: segment,path)",
+        help=f"integrators, or {', '.join(methods.VARIANTS)} (default: segment,path)",
     )
     add(
         "--time",
