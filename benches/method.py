@@ -129,7 +129,8 @@ def plot() -> None:
         axis.set(title=name, xscale="log", ylim=(-4, 4))
         axis.set_xticks(SIZES, [f"{s:g}" for s in SIZES])
         axis.minorticks_off()
-    figure.supxlabel("edge of a fixed kernel, pixels")
+    for axis in axes[1]:
+        axis.set_xlabel("edge of a fixed kernel, pixels")
     figure.supylabel("mean of the picture against the reference, %")
     handles = {
         h.get_label(): h for a in axes.flat for h in a.get_legend_handles_labels()[0]
@@ -137,8 +138,8 @@ def plot() -> None:
     figure.legend(
         handles.values(),
         handles.keys(),
-        loc="outside lower center",
-        ncols=6,
+        loc="outside upper center",
+        ncols=3,
         frameon=False,
     )
     figure.savefig(PICTURES / "consistency.png", dpi=100)

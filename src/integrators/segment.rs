@@ -5,7 +5,7 @@ use crate::film::{Pass, Sample};
 use crate::math::Sampler;
 use crate::math::sampler::hash;
 use crate::transport::camera::{CameraSampler, Primary};
-use crate::transport::cluster::{Clusters, Numbered};
+use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
 use crate::transport::light::LightSampler;
 use crate::transport::propagate::Reflected;
@@ -95,7 +95,12 @@ impl Segment {
             return false;
         }
         costs.stage("clustering", self.clusters.bytes());
-        if !self.clusters.measure(world, &grid, all, light_paths > 0.0, cut) {
+        let areas = match self.techniques.estimator {
+            _ if light_paths == 0.0 => Areas::None,
+            Estimator::LeaveOneOut => Areas::OfPhotons,
+            Estimator::Literal => Areas::True,
+        };
+        if !self.clusters.measure(world, &grid, all, areas, cut) {
             return false;
         }
         costs.stage("areas", 0);

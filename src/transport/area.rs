@@ -6,10 +6,8 @@ use crate::math::sampler::{hash, hash_unit};
 use crate::shading::{SurfaceClass, World};
 use glam::{Vec2, Vec3};
 
-/// Coverage points that have to lie on the cluster, where photons are divided by its area.
-pub const MANY_POINTS: u32 = 8;
-/// The same where the area only decides how much each technique counts.
-pub const FEW_POINTS: u32 = 2;
+/// Coverage points that have to lie on the cluster.
+const POINTS: u32 = 8;
 /// Most points that are tried to find them.
 const MOST_TRIES: u32 = 256;
 /// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
@@ -64,24 +62,18 @@ impl Cell<'_> {
 
     /// Estimate by rays through the voxel, along the axis nearest to the normal, which meet what of the surface belongs
     /// to the cluster. Photons are divided by the area, so it is the reciprocal that has to be right on average:
-    /// independent points are tried until `wanted` of them lie on the cluster (inverse binomial sampling, Haldane
-    /// 1945). `hidden`:
-    /// whether a point with its normal is out of the representative's sight.
-    pub fn coverage(
-        &self,
-        world: &World,
-        point: Vec3,
-        wanted: u32,
-        hidden: &impl Fn(Vec3, Vec3) -> bool,
-    ) -> f32 {
+    /// independent points are tried until so many of them lie on the cluster (inverse binomial sampling, Haldane
+    /// 1945). `hidden`: whether a point with its normal is out of the representative's sight.
+    pub fn coverage(&self, world: &World, hidden: &impl Fn(Vec3, Vec3) -> bool) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
         let n = self.representative.normal;
         let axis = n.abs().max_position();
         let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
         let bin = self.grid.bin(n);
-        let seed = hash(point.x.to_bits(), hash(point.y.to_bits(), point.z.to_bits()));
+        let at = self.representative.position;
+        let seed = hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits()));
         let (mut sum, mut tries, mut found) = (0.0, 0, 0);
-        while tries < MOST_TRIES && found < wanted {
+        while tries < MOST_TRIES && found < POINTS {
             let u = Vec2::new(hash_unit(seed, 2 * tries), hash_unit(seed, 2 * tries + 1));
             tries += 1;
             let mut top = low;
@@ -95,7 +87,7 @@ impl Cell<'_> {
             let (mut is_first, mut is_there) = (true, false);
             world.for_each_surface(top, bottom, LAYERS, |p| {
                 // where nothing divides the cluster, only what bends away or lies below something may be out of sight
-                let rise = (p.place.position - self.representative.position).dot(n);
+                let rise = (p.place.position - at).dot(n);
                 let is_doubtful = self.parted.is_some() || !is_first || rise.abs() > NEAR_PLANE * edge;
                 is_first = false;
                 let class = world.class(p.material);
@@ -116,7 +108,7 @@ impl Cell<'_> {
             found += u32::from(is_there);
         }
         // the cluster has arrivals, so it is somewhere between the points
-        sum.max(0.5) / tries as f32 * edge * edge
+        if found == 0 { self.plane_cut(at) / tries as f32 } else { sum / tries as f32 * edge * edge }
     }
 }
 

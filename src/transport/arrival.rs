@@ -17,6 +17,11 @@ pub fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
     if albedo > SURVIVAL[0] { albedo.min(SURVIVAL[1]) } else { SURVIVAL[0] }
 }
 
+/// The same at the first arrivals of a camera path, which decide most of the picture's noise: paths are longer there.
+pub fn early_survival(q: f32) -> f32 {
+    q.sqrt().min(SURVIVAL[1])
+}
+
 /// The end of a segment as it is stored; `goes_on` is the caller's to set.
 pub fn arrival(world: &World, end: &End) -> Arrival {
     let End { hit, vertex, wo, end_probability, .. } = end;

@@ -1,6 +1,6 @@
 //! Sequential sampling from the camera, with a next-event segment at every arrival (S8).
 
-use super::arrival::arrival;
+use super::arrival::{arrival, early_survival};
 use super::store::{CameraStore, EmissionHit, NextEvent, Outgoing};
 use super::walk::{Chain, End, Follow, Witness};
 use crate::film::FirstHit;
@@ -9,6 +9,9 @@ use crate::shading::bsdf::Walk;
 use crate::shading::emitters::Receiver;
 use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
 use glam::Vec3;
+
+/// Arrivals of a path at which it is let go more rarely.
+const EARLY: usize = 2;
 
 /// What a pixel sees along its primary segment.
 #[derive(Clone, Copy, Debug)]
@@ -175,7 +178,8 @@ impl CameraSampler<'_> {
         let mut seeing = Seeing { sampler: self, primary: &mut primary };
         let (chain, end) = follow.segment(Piece::from_camera(ray), sampler, &mut seeing, rays);
         let Some(mut end) = end else { return primary };
-        primary.arrival = Some(store.arrivals.len() as u32);
+        let first = store.arrivals.len();
+        primary.arrival = Some(first as u32);
         primary.weight = chain.throughput / chain.forward;
         primary.passages = chain.passages;
         let mut inverse_n2 = 1.0 / (chain.index * chain.index);
@@ -185,6 +189,8 @@ impl CameraSampler<'_> {
             let mut arrived = arrival(self.world, &end);
             if !self.goes_on {
                 arrived.survival = 0.0;
+            } else if index - first < EARLY {
+                arrived.survival = early_survival(arrived.survival);
             }
             let receiver = end.hit.receiver(&end.vertex.bsdf, end.wo);
             let next_event = match self.next_event {

@@ -1,7 +1,7 @@
 //! Clusters: arrivals that share a voxel, a bin of normals and a class of surface.
 
 use super::Cut;
-use super::area::{Cell, FEW_POINTS, MANY_POINTS};
+use super::area::Cell;
 use super::grid::Grid;
 use super::store::Arrival;
 use crate::math::sampler::hash;
@@ -28,8 +28,11 @@ pub struct Cluster {
     pub cameras: u32,
     /// Light arrivals.
     pub lights: u32,
-    /// Surface area that it covers.
+    /// Area by which the densities of techniques are divided. Only their ratios come of it, and those need one
+    /// figure for all techniques rather than a true one: that of the voxel's face, unless true ones are asked for.
     pub area: f32,
+    /// One over the surface area that it covers, right on average; zero where nobody asks.
+    pub inverse_area: f32,
     /// Class of its surfaces.
     pub class: SurfaceClass,
     /// Arrival in whose voxel it is.
@@ -51,6 +54,17 @@ impl Cluster {
         let start = self.first + self.cameras;
         start as usize..(start + self.lights) as usize
     }
+}
+
+/// Which surface areas are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Areas {
+    /// None: without light paths nothing is divided by one.
+    None,
+    /// Those of clusters where camera paths meet photons.
+    OfPhotons,
+    /// All, for the densities as well.
+    True,
 }
 
 /// All clusters of an iteration. Arrivals are numbered: the camera's first, then the lights'.
@@ -142,14 +156,13 @@ impl Clusters {
         true
     }
 
-    /// Finds the clusters' areas. `exact`: whether light paths are sampled; without them areas cancel. Returns
-    /// `false` if it was stopped.
-    pub fn measure(&mut self, world: &World, grid: &Grid, all: Numbered, exact: bool, cut: &Cut) -> bool {
+    /// Finds the clusters' areas. Returns `false` if it was stopped.
+    pub fn measure(&mut self, world: &World, grid: &Grid, all: Numbered, areas: Areas, cut: &Cut) -> bool {
         let order = &self.order;
         self.clusters.par_iter_mut().with_min_len(GRAIN).for_each(|c| {
             if !cut.is_raised() {
                 let members = &order[c.first as usize..][..(c.cameras + c.lights) as usize];
-                c.area = area(world, grid, all, members, c, exact) / c.parts as f32;
+                measure(world, grid, all, members, c, areas);
             }
         });
         !cut.is_raised()
@@ -220,6 +233,7 @@ impl Layout {
                     cameras,
                     lights: taken.len() as u32 - cameras,
                     area: 0.0,
+                    inverse_area: 0.0,
                     class,
                     representative,
                     parted: parted.then_some(far),
@@ -230,17 +244,28 @@ impl Layout {
     }
 }
 
-/// Area of a cluster, before it is shared out among its parts.
-fn area(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &Cluster, exact: bool) -> f32 {
+/// The areas of a cluster, each part of a voxel's having its share.
+fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut Cluster, areas: Areas) {
     let representative = all.get(c.representative);
-    let cell = Cell { grid, voxel: grid.voxel(representative.position), representative, parted: c.parted };
-    let mean = members.iter().map(|&i| all.get(i).position - representative.position).sum::<Vec3>();
-    let point = representative.position + mean / members.len() as f32;
-    if !exact {
-        return cell.plane_cut(point);
+    let voxel = grid.voxel(representative.position);
+    let parts = c.parts as f32;
+    let (_, edge) = grid.place(&voxel);
+    c.area = edge * edge / parts;
+    let is_needed = match areas {
+        Areas::None => false,
+        Areas::OfPhotons => c.cameras > 0 && c.lights > 0,
+        Areas::True => true,
+    };
+    if !is_needed {
+        return;
     }
-    let points = if c.cameras > 0 && c.lights > 0 { MANY_POINTS } else { FEW_POINTS };
+    let cell = Cell { grid, voxel, representative, parted: c.parted };
     let hub = Hub::new(grid, representative);
-    cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)))
-        .unwrap_or_else(|| cell.coverage(world, point, points, &|p, n| hub.is_hidden(world, p, n)))
+    let area = cell
+        .on_one_triangle(world, members.iter().map(|&i| all.get(i)))
+        .unwrap_or_else(|| cell.coverage(world, &|p, n| hub.is_hidden(world, p, n)));
+    c.inverse_area = parts / area;
+    if areas == Areas::True {
+        c.area = area / parts;
+    }
 }

@@ -123,7 +123,7 @@ pub(super) fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
     };
     // with no photon to compare with, the camera has it all; with no camera path either, this one has
     let weight = if own + others > 0.0 { own / (own + others) } else { 1.0 };
-    photon.flux * (weight / c.area)
+    photon.flux * (weight * c.inverse_area)
 }
 
 /// What every photon brings to its cluster; nothing where no camera path arrives.

@@ -7,7 +7,8 @@ use glam::{DMat4, DVec3, Vec2, Vec3};
 use segue::math::sampler::hash_unit;
 use segue::math::warp;
 use segue::shading::World;
-use segue::transport::cluster::{Cluster, Clusters, Numbered};
+use segue::transport::area::Cell;
+use segue::transport::cluster::{Areas, Clusters, Numbered};
 use segue::transport::grid::Grid;
 use segue::transport::store::Arrival;
 use std::f64::consts::PI;
@@ -28,6 +29,20 @@ fn photons(world: &World, seed: u32, sides: &[Vec3], count: u32) -> Vec<Arrival>
         .collect()
 }
 
+/// Areas of the clusters, by the method of the engine and by the paper's plane through one of its arrivals.
+fn both_areas(world: &World, grid: &Grid, all: Numbered) -> [Vec<f32>; 2] {
+    let mut clusters = Clusters::default();
+    assert!(clusters.group(world, grid, all, &ON) && clusters.measure(world, grid, all, Areas::True, &ON));
+    let by_rays = clusters.of.iter().map(|&c| clusters.clusters[c as usize].area);
+    let first = |c: u32| all.get(clusters.order[clusters.clusters[c as usize].first as usize]);
+    let by_plane = clusters.of.iter().map(|&c| {
+        let representative = first(c);
+        let voxel = grid.voxel(representative.position);
+        Cell { grid, voxel, representative, parted: None }.plane_cut(representative.position)
+    });
+    [by_rays.collect(), by_plane.collect()]
+}
+
 /// True areas of the clusters of some arrivals, where they are known.
 type Truth<'a> = &'a dyn Fn(&Grid, &[Arrival]) -> Vec<Option<f64>>;
 
@@ -39,12 +54,7 @@ fn bias(world: &World, seeds: u32, photons: impl Fn(u32) -> Vec<Arrival>, truth:
         let photons = photons(seed);
         let grid = Grid::new(&sensor, 1.0, seed);
         let all = Numbered { camera: &[], light: &photons };
-        let areas: [Vec<f32>; 2] = [true, false].map(|exact| {
-            let mut clusters = Clusters::default();
-            assert!(clusters.group(world, &grid, all, &ON));
-            assert!(clusters.measure(world, &grid, all, exact, &ON));
-            clusters.of.iter().map(|&c| clusters.clusters[c as usize].area).collect()
-        });
+        let areas = both_areas(world, &grid, all);
         for (i, exact) in truth(&grid, &photons).into_iter().enumerate() {
             let Some(exact) = exact else { continue };
             count += 1.0;
@@ -133,7 +143,9 @@ fn a_tilted_plane_is_cut_exactly() {
         let exact = inside as f32 * cell * cell / a.normal.z.abs();
         let mut clusters = Clusters::default();
         let all = Numbered { camera: &[], light: &[a, a] };
-        assert!(clusters.group(&world, &grid, all, &ON) && clusters.measure(&world, &grid, all, true, &ON));
+        assert!(
+            clusters.group(&world, &grid, all, &ON) && clusters.measure(&world, &grid, all, Areas::True, &ON)
+        );
         let got = clusters.clusters[0].area;
         assert!((got / exact - 1.0).abs() < 5e-3, "{got} {exact}");
     }
@@ -162,12 +174,16 @@ fn photons_on_spheres_are_as_dense_as_they_are() {
             let (camera, light) = (uniform(2 * seed, queries), uniform(2 * seed + 1, photons));
             let grid = Grid::new(&sensor, 1.0, seed);
             let all = Numbered { camera: &camera, light: &light };
-            [true, false].map(|by_coverage| {
-                let mut clusters = Clusters::default();
-                assert!(clusters.group(&world, &grid, all, &ON));
-                assert!(clusters.measure(&world, &grid, all, by_coverage, &ON));
-                let found = |c: &Cluster| f64::from(c.cameras * c.lights) / f64::from(c.area);
-                clusters.clusters.iter().map(found).sum::<f64>() / f64::from(queries) / exact
+            // every query finds the photons of its cluster, each over the cluster's area
+            let areas = both_areas(&world, &grid, all);
+            let mut clusters = Clusters::default();
+            assert!(clusters.group(&world, &grid, all, &ON));
+            areas.map(|areas| {
+                let found = |i: usize| {
+                    let c = &clusters.clusters[clusters.of[i] as usize];
+                    f64::from(c.lights) / f64::from(areas[i])
+                };
+                (0..camera.len()).map(found).sum::<f64>() / f64::from(queries) / exact
             })
         };
         let found: Vec<[f64; 2]> = (0..12).map(density).collect();

@@ -8,7 +8,7 @@ use segue::shading::bsdf::Walk;
 use segue::shading::{Piece, World};
 use segue::transport::Estimator;
 use segue::transport::arrival::arrival;
-use segue::transport::cluster::{Clusters, Numbered};
+use segue::transport::cluster::{Areas, Clusters, Numbered};
 use segue::transport::grid::Grid;
 use segue::transport::store::{Arrival, CameraStore, Carry, LightStore, NextEvent, Outgoing, Photon, Rivals};
 use segue::transport::walk::End;
@@ -109,7 +109,7 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
     let grid = Grid::new(&sensor, 1.0, seed);
     let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
     let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
-    assert!(clusters.group(world, &grid, all, &ON) && clusters.measure(world, &grid, all, true, &ON));
+    assert!(clusters.group(world, &grid, all, &ON) && clusters.measure(world, &grid, all, Areas::True, &ON));
     let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters };
     assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
     let n = camera.arrivals.len();
@@ -184,7 +184,7 @@ fn densities_integrate_to_the_number_of_paths_that_go_on() {
             let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
             let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
             assert!(clusters.group(&world, &grid, all, &ON));
-            assert!(clusters.measure(&world, &grid, all, true, &ON));
+            assert!(clusters.measure(&world, &grid, all, Areas::True, &ON));
             let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters };
             assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
             let (mut integral, mut expected) = (0.0, 0.0);

@@ -8,7 +8,7 @@ use crate::shading::bsdf::Walk;
 use crate::shading::{CameraRay, Piece, Sensor, World};
 use crate::transport::Estimator;
 use crate::transport::arrival::arrival;
-use crate::transport::cluster::{Clusters, Numbered};
+use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
 use crate::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing};
 use crate::transport::walk::{Follow, Nobody};
@@ -111,7 +111,10 @@ fn the_weights_of_all_techniques_sum_to_one() {
         let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
         let cut = Cut(&|| false);
         let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
-        assert!(clusters.group(&world, &grid, all, &cut) && clusters.measure(&world, &grid, all, true, &cut));
+        assert!(
+            clusters.group(&world, &grid, all, &cut)
+                && clusters.measure(&world, &grid, all, Areas::OfPhotons, &cut)
+        );
         let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters };
         assert!(weights.weigh(s, Estimator::LeaveOneOut, &cut));
         let constants = segments(s, &weights);
@@ -128,7 +131,7 @@ fn the_weights_of_all_techniques_sum_to_one() {
             let p_light = weights.densities[clusters.place[i + 1] as usize].light;
             // the light path itself is left out both ways
             let camera_weight = segment.camera / (segment.camera + segment.light * (p_light - own).max(0.0));
-            let light_weight = photon_value(s, &weights, i + 1).x * start.area;
+            let light_weight = photon_value(s, &weights, i + 1).x / start.inverse_area;
             let sum = camera_weight + light_weight;
             assert!((sum - 1.0).abs() < 2e-4, "{wall}, {i}: {camera_weight} + {light_weight}");
             // and with the light path itself among the techniques
