@@ -198,8 +198,9 @@ impl Segment {
                     if cut.is_raised() {
                         break;
                     }
-                    // the paths of one iteration are stratified among each other
-                    let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k);
+                    // as with pixels, a path's numbers are stratified from iteration to iteration: among the paths of
+                    // one iteration they would not be independent enough of each other
+                    let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, k, index);
                     sampler.path(&mut random, &mut store, &mut rays);
                 }
                 context.counters.rays.fetch_add(rays, Relaxed);

@@ -6,10 +6,12 @@ use crate::math::sampler::{hash, hash_unit};
 use crate::shading::{SurfaceClass, World};
 use glam::{Vec2, Vec3};
 
-/// Coverage points that have to lie on the cluster.
-const POINTS: u32 = 8;
+/// Coverage points that have to lie on the cluster, where photons are divided by its area.
+pub const MANY_POINTS: u32 = 8;
+/// The same where the area only decides how much each technique counts.
+pub const FEW_POINTS: u32 = 3;
 /// Most points that are tried to find them.
-const MOST_TRIES: u32 = 256;
+const MOST_TRIES: u32 = 2048;
 /// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
 const NEAR_PLANE: f32 = 0.05;
 /// Most surfaces that are looked at below one coverage point.
@@ -62,18 +64,19 @@ impl Cell<'_> {
 
     /// Estimate by rays through the voxel, along the axis nearest to the normal, which meet what of the surface belongs
     /// to the cluster. Photons are divided by the area, so it is the reciprocal that has to be right on average:
-    /// independent points are tried until so many of them lie on the cluster (inverse binomial sampling, Haldane
-    /// 1945). `hidden`: whether a point with its normal is out of the representative's sight.
-    pub fn coverage(&self, world: &World, hidden: &impl Fn(Vec3, Vec3) -> bool) -> f32 {
+    /// independent points are tried until `wanted` of them lie on the cluster (inverse binomial sampling, Haldane
+    /// 1945). Estimates of different `wanted` are independent. `hidden`: whether a point with its normal is out of
+    /// the representative's sight.
+    pub fn coverage(&self, world: &World, wanted: u32, hidden: &impl Fn(Vec3, Vec3) -> bool) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
         let n = self.representative.normal;
         let axis = n.abs().max_position();
         let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
         let bin = self.grid.bin(n);
         let at = self.representative.position;
-        let seed = hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits()));
-        let (mut sum, mut tries, mut found) = (0.0, 0, 0);
-        while tries < MOST_TRIES && found < POINTS {
+        let seed = hash(wanted, hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits())));
+        let (mut sum, mut squares, mut tries, mut found) = (0.0, 0.0, 0, 0);
+        while tries < MOST_TRIES && found < wanted {
             let u = Vec2::new(hash_unit(seed, 2 * tries), hash_unit(seed, 2 * tries + 1));
             tries += 1;
             let mut top = low;
@@ -102,13 +105,21 @@ impl Cell<'_> {
                 if there {
                     is_there = true;
                     // a surface seen edge-on would count without bound
-                    sum += 1.0 / p.place.normal[axis].abs().max(0.05);
+                    let slope = 1.0 / p.place.normal[axis].abs().max(0.05);
+                    sum += slope;
+                    squares += slope * slope;
                 }
             });
             found += u32::from(is_there);
         }
         // the cluster has arrivals, so it is somewhere between the points
-        if found == 0 { self.plane_cut(at) / tries as f32 } else { sum / tries as f32 * edge * edge }
+        if found == 0 {
+            return self.plane_cut(at) / tries as f32;
+        }
+        // the reciprocal of a mean of slopes is too large by their variance over their number, to first order
+        let spread =
+            if found > 1 { (found as f32 * squares / (sum * sum) - 1.0) / (found - 1) as f32 } else { 0.0 };
+        sum / tries as f32 * edge * edge * (1.0 + spread)
     }
 }
 

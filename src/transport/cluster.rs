@@ -1,7 +1,7 @@
 //! Clusters: arrivals that share a voxel, a bin of normals and a class of surface.
 
 use super::Cut;
-use super::area::Cell;
+use super::area::{Cell, FEW_POINTS, MANY_POINTS};
 use super::grid::Grid;
 use super::store::Arrival;
 use crate::math::sampler::hash;
@@ -28,10 +28,11 @@ pub struct Cluster {
     pub cameras: u32,
     /// Light arrivals.
     pub lights: u32,
-    /// Area by which the densities of techniques are divided. Only their ratios come of it, and those need one
-    /// figure for all techniques rather than a true one: that of the voxel's face, unless true ones are asked for.
+    /// Area by which the densities of techniques are divided: a rough estimate of the surface area that it covers.
+    /// Only ratios of techniques come of it, and those need one figure for all of them rather than the true one.
     pub area: f32,
-    /// One over the surface area that it covers, right on average; zero where nobody asks.
+    /// One over the surface area, right on average and independent of `area`, so that the product of a weight and a
+    /// photon over the area is right, too; zero where nobody asks.
     pub inverse_area: f32,
     /// Class of its surfaces.
     pub class: SurfaceClass,
@@ -61,9 +62,9 @@ impl Cluster {
 pub enum Areas {
     /// None: without light paths nothing is divided by one.
     None,
-    /// Those of clusters where camera paths meet photons.
+    /// For clusters where camera paths meet photons; others get rough ones.
     OfPhotons,
-    /// All, for the densities as well.
+    /// For all, and for the densities as well.
     True,
 }
 
@@ -251,21 +252,22 @@ fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut C
     let parts = c.parts as f32;
     let (_, edge) = grid.place(&voxel);
     c.area = edge * edge / parts;
-    let is_needed = match areas {
-        Areas::None => false,
-        Areas::OfPhotons => c.cameras > 0 && c.lights > 0,
-        Areas::True => true,
-    };
-    if !is_needed {
+    if areas == Areas::None {
         return;
     }
     let cell = Cell { grid, voxel, representative, parted: c.parted };
     let hub = Hub::new(grid, representative);
-    let area = cell
-        .on_one_triangle(world, members.iter().map(|&i| all.get(i)))
-        .unwrap_or_else(|| cell.coverage(world, &|p, n| hub.is_hidden(world, p, n)));
-    c.inverse_area = parts / area;
+    let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)));
+    let estimate = |points: u32| {
+        exact.unwrap_or_else(|| cell.coverage(world, points, &|p, n| hub.is_hidden(world, p, n))) / parts
+    };
     if areas == Areas::True {
-        c.area = area / parts;
+        c.area = estimate(MANY_POINTS);
+        c.inverse_area = 1.0 / c.area;
+        return;
+    }
+    c.area = estimate(FEW_POINTS);
+    if c.cameras > 0 && c.lights > 0 {
+        c.inverse_area = 1.0 / estimate(MANY_POINTS);
     }
 }
