@@ -11,7 +11,7 @@ pub const MANY_POINTS: u32 = 8;
 /// The same where the area only decides how much each technique counts.
 pub const FEW_POINTS: u32 = 3;
 /// Most points that are tried to find them.
-const MOST_TRIES: u32 = 2048;
+const MOST_TRIES: u32 = 256;
 /// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
 const NEAR_PLANE: f32 = 0.05;
 /// Most surfaces that are looked at below one coverage point.

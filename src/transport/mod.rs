@@ -66,7 +66,7 @@ impl Default for Techniques {
         Self {
             estimator: Estimator::default(),
             kernel: kernel::Kernel::default(),
-            light_paths: 1.0,
+            light_paths: 0.5,
             next_event: true,
             camera_paths: true,
         }
