@@ -15,6 +15,8 @@ from .export.settings import film_size, render_settings
 from .log import ExportLog
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .engine import SegueRenderEngine
 
 # Showing the picture may take this share of the time of the render.
@@ -75,13 +77,20 @@ class _Monitor:
     """Carries progress to Blender and the user's wish to stop back to the render."""
 
     def __init__(
-        self, engine: SegueRenderEngine, frame: Frame, render: Any, view: str, span: tuple[int, int]
+        self,
+        engine: SegueRenderEngine,
+        frame: Frame,
+        render: Any,
+        view: str,
+        span: tuple[int, int],
+        error_text: Callable[[dict[str, Any]], str],
     ) -> None:
         self.engine = engine
         self.frame = frame
         self.render = render
         self.view = view
         self.index, self.count = span
+        self.error_text = error_text
         self.dirty: tuple[int, int, int, int] | None = None
         # Nobody watches a render without a window.
         self.next_display = (
@@ -91,7 +100,7 @@ class _Monitor:
     def progress(self, state: dict[str, Any]) -> bool:
         """Called by the render, at least ten times a second; true asks it to stop."""
         self.engine.update_progress((self.index + state["fraction"]) / self.count)
-        self.engine.update_stats(self.frame.layer, _status_line(state))
+        self.engine.update_stats(self.frame.layer, _status_line(state, self.error_text(state)))
         self._display()
         return self.engine.stop_requested()
 
@@ -117,7 +126,7 @@ class _Monitor:
         self.next_display = end + max(0.1, (end - start) / _DISPLAY_SHARE)
 
 
-def _status_line(state: dict[str, Any]) -> str:
+def _status_line(state: dict[str, Any], error: str) -> str:
     """One line on what the render does now and how long it still takes."""
     parts = [str(state["stage"]).capitalize()]
     remaining = state.get("remaining")
@@ -125,9 +134,7 @@ def _status_line(state: dict[str, Any]) -> str:
         minutes, seconds = divmod(float(remaining), 60.0)
         parts.append(f"Remaining: {int(minutes):02d}:{seconds:05.2f}")
     parts.append(f"Sample {int(state['samples'])}")
-    error = state.get("estimated_error")
-    if error is not None and np.isfinite(error) and error > 0:
-        parts.append(f"Error {error:.2g}")
+    parts.append(error.capitalize())
     return " | ".join(parts)
 
 
@@ -157,10 +164,10 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
             _report(engine, log, scene.info())
         engine.update_stats(frame.layer, "Building the acceleration structure")
         render = segue.Render(scene, settings)
-        monitor = _Monitor(engine, frame, render, view, (index, len(views)))
+        monitor = _Monitor(engine, frame, render, view, (index, len(views)), segue.error_text)
         finished = render.run(progress=monitor.progress, tile=monitor.tile)
         frame.write(_read_passes(render, frame), view=view)
-        _finish(engine, frame, render.stats())
+        _finish(engine, frame, render.stats(), segue.error_text)
         if not finished:
             return
 
@@ -179,12 +186,19 @@ def _report(engine: SegueRenderEngine, log: ExportLog, info: dict[str, Any]) -> 
             engine.report({"WARNING"}, f"Segue: {message}")
 
 
-def _finish(engine: SegueRenderEngine, frame: Frame, stats: dict[str, Any]) -> None:
+def _finish(
+    engine: SegueRenderEngine,
+    frame: Frame,
+    stats: dict[str, Any],
+    error_text: Callable[[dict[str, Any]], str],
+) -> None:
     """Leave the final figures in the status line and speak of pixels that went wrong."""
     mebibytes = stats.get("peak_memory_bytes", 0) / 2**20
     engine.update_memory_stats(memory_used=mebibytes, memory_peak=mebibytes)
+    minutes, seconds = divmod(round(stats.get("seconds", 0.0)), 60)
     engine.update_stats(
-        frame.layer, f"{stats.get('samples', 0):.0f} samples in {stats.get('seconds', 0.0):.2f} s"
+        frame.layer,
+        f"{stats.get('samples', 0):.0f} samples, {error_text(stats)} after {minutes}:{seconds:02d}",
     )
     if stats.get("non_finite"):
         engine.report(

@@ -28,6 +28,7 @@ fn noisy(x: u32, y: u32, iteration: u32) -> Sample {
         material_index: hash(y, x) % 100,
     };
     Sample {
+        unfiltered: None,
         radiance: emission + direct + rgb(18),
         alpha: u(21),
         emission,

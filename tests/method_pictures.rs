@@ -169,7 +169,7 @@ fn segment_graph() {
     }
     let lights =
         LightSampler { world: &world, paths: 12.0, next_event: true, estimator: Estimator::LeaveOneOut };
-    (0..12).for_each(|k| lights.path(&mut Sampler::new(9, 0, k), &mut light, &mut 0));
+    (0..12).for_each(|k| lights.path(k, &mut Sampler::new(9, 0, k), &mut light, &mut 0));
     let lamp = (1.9 - EYE.z) as f32;
     for (i, a) in camera.arrivals.iter().enumerate() {
         let n = &camera.next_events[i];

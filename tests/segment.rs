@@ -2,56 +2,29 @@
 
 mod common;
 
-use common::{Stage, icosphere, mean};
-use glam::{DMat4, DVec3, Vec3};
+use common::{PATH, Stage, icosphere};
+use glam::{DMat4, DVec3};
 use segue::film::Pass;
 
-/// The light of a scene by some settings: mean of a pass and its standard error, from renders of different seeds.
+/// The mean of a pass and its standard error, from 4 seeds.
 fn estimate(s: &Stage, side: u32, samples: u32, pass: Pass, settings: &str) -> (f64, f64) {
-    const SEEDS: u32 = 4;
-    let means: Vec<f64> = (0..SEEDS)
-        .map(|seed| {
-            let json = format!(r#","seed":{seed},"passes":["{}"]{settings}"#, pass.name());
-            mean(&s.render(side, samples, &json), pass)
-        })
-        .collect();
-    let n = f64::from(SEEDS);
-    let m = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0);
-    (m, (variance / n).sqrt())
+    common::estimate(s, (side, samples, 4), pass, settings)
 }
 
-/// Asserts that two estimates agree, but for `slack` (relative) that a kernel of finite size may leave.
-fn assert_agree(what: &str, (a, sa): (f64, f64), (b, sb): (f64, f64), slack: f64) {
-    let sigma = sa.hypot(sb);
-    assert!(
-        (a - b).abs() <= 4.5 * sigma + slack * b.abs(),
-        "{what}: {a} +- {sa} against {b} +- {sb}, {:.2} % apart",
-        100.0 * (a / b - 1.0)
-    );
-    assert!(sigma < 0.025 * b.abs(), "{what}: too noisy to say anything, {sa} and {sb} of {b}");
+/// Agreement but for `slack` (relative) that a kernel of finite size may leave.
+fn assert_agree(what: &str, a: (f64, f64), b: (f64, f64), slack: f64) {
+    common::assert_agree(what, a, b, (4.5, slack));
 }
-
-const PATH: &str = r#","integrator":"path""#;
 
 fn segment(more: &str) -> String {
     format!(r#","integrator":"segment","kernel":"fixed","kernel_size":0.5{more}"#)
-}
-
-/// A quad between four corners, counter-clockwise seen from where it faces.
-fn quad(s: &mut Stage, corners: [[f32; 3]; 4], material: u32) {
-    let mesh = s.mesh(&corners.map(Vec3::from), &[0, 1, 2, 0, 2, 3], None);
-    s.place(mesh, material, DMat4::IDENTITY);
 }
 
 /// A corner of a room with coloured walls, open to the camera's side, and a ball in it.
 fn corner(ball: &str, wall: &str) -> Stage {
     let mut s = Stage::default();
     let wall = s.material(wall);
-    quad(&mut s, [[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]], wall);
-    quad(&mut s, [[-1., 1., 0.], [1., 1., 0.], [1., 1., 2.], [-1., 1., 2.]], wall);
-    quad(&mut s, [[-1., -1., 0.], [-1., 1., 0.], [-1., 1., 2.], [-1., -1., 2.]], wall);
-    quad(&mut s, [[-1., -1., 2.], [-1., 1., 2.], [1., 1., 2.], [1., -1., 2.]], wall);
+    s.corner(wall);
     let ball = s.material(ball);
     let (points, triangles) = icosphere(3);
     let mesh = s.mesh(&points, &triangles, Some(&points));
@@ -115,12 +88,13 @@ fn the_literal_recursion_has_the_bias_that_leaving_one_out_removes() {
         corner(WALL, r#"{"surface":{"type":"principled","base_color":[0.7,0.6,0.5],"roughness":0.5}}"#);
     s.light(RECT);
     let reference = estimate(&s, 32, 256, Pass::Indirect, PATH);
-    let fixed = |size: f32, more: &str| {
+    let render = |size: f32, samples: u32, more: &str| {
         let set = format!(
             r#","integrator":"segment","next_event":false,"kernel":"fixed","kernel_size":{size}{more}"#
         );
-        estimate(&s, 32, 64, Pass::Indirect, &set)
+        estimate(&s, 32, samples, Pass::Indirect, &set)
     };
+    let fixed = |size: f32, more: &str| render(size, 64, more);
     let mut biases = Vec::new();
     for size in [2.0, 1.0, 0.3] {
         let own = fixed(size, r#","light_paths":1"#);
@@ -135,11 +109,12 @@ fn the_literal_recursion_has_the_bias_that_leaving_one_out_removes() {
     }
     assert!(biases[0] < biases[1] && biases[1] < biases[2], "{biases:?}");
     assert!(biases[2] > 0.03, "{biases:?}");
-    let many = fixed(16.0, r#","light_paths":4"#);
-    let many_literal = fixed(16.0, r#","light_paths":4,"estimator":"literal""#);
+    let many = render(16.0, 16, r#","light_paths":4"#);
+    let many_literal = render(16.0, 16, r#","light_paths":4,"estimator":"literal""#);
     assert_agree("many photons", many_literal, many, 1e-2);
     let none = r#","light_paths":0,"max_depth":3"#;
-    let alike = (fixed(1.0, none).0, fixed(1.0, &format!(r#"{none},"estimator":"literal""#)).0);
+    let literal = format!(r#"{none},"estimator":"literal""#);
+    let alike = (render(1.0, 16, none).0, render(1.0, 16, &literal).0);
     assert!((alike.0 / alike.1 - 1.0).abs() < 1e-5, "{alike:?}");
 }
 
@@ -207,7 +182,7 @@ fn bounces_are_counted_as_in_path_tracing() {
     let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
     let mut s = corner(glass, WALL);
     let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
-    quad(&mut s, [[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
+    s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
     for depth in [0, 1, 2, 3, 5] {
         let limit = format!(r#","max_depth":{depth}"#);
         let reference = estimate(&s, 32, 192, Pass::Combined, &format!("{PATH}{limit}"));
@@ -222,10 +197,38 @@ fn passes_split_the_light_as_path_tracing_does() {
     let mut s = corner(glass, WALL);
     s.light(DOME);
     let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
-    quad(&mut s, [[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
+    s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
     for pass in [Pass::Emission, Pass::Direct, Pass::Indirect] {
         let reference = estimate(&s, 32, 192, pass, PATH);
         let got = estimate(&s, 32, 96, pass, &segment(""));
         assert_agree(pass.name(), got, reference, 1e-2);
     }
+}
+
+/// What each path finds by itself is right on average, so beside it a large kernel is seen to blur and a small one is
+/// not: whatever were wrong with the unfiltered estimate would be told as a systematic error.
+#[test]
+fn the_systematic_error_of_large_kernels_is_told() {
+    let frosted = r#"{"surface":{"type":"glass","ior":1.4,"roughness":0.5}}"#;
+    let clear = r#"{"surface":{"type":"glass","ior":1.4}}"#;
+    let layered =
+        r#"{"surface":{"type":"principled","base_color":[0.8,0.3,0.2],"roughness":0.4,"coat":0.5}}"#;
+    for (ball, wall) in [(WALL, WALL), (frosted, layered), (clear, WALL)] {
+        let mut s = corner(ball, wall);
+        s.light(RECT);
+        s.light(DOME);
+        for more in ["", r#","next_event":false"#, r#","max_depth":2"#] {
+            let bias = |size: f32| {
+                let set = format!(r#","integrator":"segment","kernel":"fixed","kernel_size":{size}{more}"#);
+                s.render(48, 32, &set).film().estimated_error().unwrap().bias.unwrap()
+            };
+            let (fine, coarse) = (bias(0.1), bias(24.0));
+            println!("{ball} {wall} {more}: {fine:.6} at 0.1 pixels, {coarse:.6} at 24");
+            assert!(fine < 2e-4 && coarse > 5e-4, "{ball}, {wall}{more}: {fine}, {coarse}");
+        }
+    }
+    let none = r#","integrator":"segment","camera_paths":false"#;
+    let mut s = corner(WALL, WALL);
+    s.light(RECT);
+    assert_eq!(s.render(16, 4, none).film().estimated_error().and_then(|e| e.bias), None);
 }

@@ -2,40 +2,20 @@
 
 mod common;
 
-use common::{Stage, assert_close, icosphere, mean};
-use glam::{DMat4, DVec3, Vec3};
+use common::{PATH, Stage, icosphere};
+use glam::{DMat4, DVec3};
 use segue::film::Pass;
 
-/// The light of a scene by some settings: mean of a pass and its standard error, from renders of different seeds.
+/// The mean of a pass and its standard error, from 8 seeds.
 fn estimate(s: &Stage, side: u32, samples: u32, pass: Pass, settings: &str) -> (f64, f64) {
-    const SEEDS: u32 = 8;
-    let means: Vec<f64> = (0..SEEDS)
-        .map(|seed| {
-            let json = format!(r#","seed":{seed},"passes":["{}"]{settings}"#, pass.name());
-            let session = s.render(side, samples, &json);
-            assert_eq!(session.film().rejected_samples(), 0, "{settings}");
-            mean(&session, pass)
-        })
-        .collect();
-    let n = f64::from(SEEDS);
-    let m = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0);
-    (m, (variance / n).sqrt())
+    common::estimate(s, (side, samples, 8), pass, settings)
 }
 
-/// Asserts that two estimates agree, but for `slack` (relative) that merging may leave.
-fn assert_agree(what: &str, (a, sa): (f64, f64), (b, sb): (f64, f64), slack: f64) {
-    let sigma = sa.hypot(sb);
-    let apart = 100.0 * (a / b - 1.0);
-    println!("{what}: {apart:.2} % apart, {:.2} % standard error", 100.0 * sigma / b);
-    assert!(
-        (a - b).abs() <= 5.0 * sigma + slack * b.abs(),
-        "{what}: {a} +- {sa} against {b} +- {sb}, {apart:.2} % apart"
-    );
-    assert!(sigma < 0.025 * b.abs(), "{what}: too noisy to say anything, {sa} and {sb} of {b}");
+/// Agreement but for `slack` (relative) that merging may leave.
+fn assert_agree(what: &str, a: (f64, f64), b: (f64, f64), slack: f64) {
+    common::assert_agree(what, a, b, (5.0, slack));
 }
 
-const PATH: &str = r#","integrator":"path""#;
 /// Methods, and the relative error that merging within a small fixed radius may leave.
 type Methods<'a> = &'a [(&'a str, f64)];
 const ALL: Methods = &[("light", 0.0), ("bdpt", 0.0), ("ppm", 5e-3), ("bpm", 5e-3), ("vcm", 5e-3)];
@@ -71,12 +51,6 @@ fn compare_pass(
     }
 }
 
-/// A quad between four corners, counter-clockwise seen from where it faces.
-fn quad(s: &mut Stage, corners: [[f32; 3]; 4], material: u32) {
-    let mesh = s.mesh(&corners.map(Vec3::from), &[0, 1, 2, 0, 2, 3], None);
-    s.place(mesh, material, DMat4::IDENTITY);
-}
-
 /// A ball of facets, with smoothed normals or its own. Light that a smoothed facet sends below the horizon of its
 /// shading normal is found from the camera alone.
 fn ball(s: &mut Stage, material: &str, is_smooth: bool) {
@@ -91,10 +65,7 @@ fn ball(s: &mut Stage, material: &str, is_smooth: bool) {
 fn corner(ball_material: &str, wall: &str, is_smooth: bool) -> Stage {
     let mut s = Stage::default();
     let wall = s.material(wall);
-    quad(&mut s, [[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]], wall);
-    quad(&mut s, [[-1., 1., 0.], [1., 1., 0.], [1., 1., 2.], [-1., 1., 2.]], wall);
-    quad(&mut s, [[-1., -1., 0.], [-1., 1., 0.], [-1., 1., 2.], [-1., -1., 2.]], wall);
-    quad(&mut s, [[-1., -1., 2.], [-1., 1., 2.], [1., 1., 2.], [1., -1., 2.]], wall);
+    s.corner(wall);
     ball(&mut s, ball_material, is_smooth);
     s.camera(DVec3::new(0.6, -3.0, 1.3), DVec3::new(0.0, 0.0, 0.8), 0.4, "");
     s
@@ -104,7 +75,7 @@ fn corner(ball_material: &str, wall: &str, is_smooth: bool) -> Stage {
 fn yard(ball_material: &str, floor: &str) -> Stage {
     let mut s = Stage::default();
     let floor = s.material(floor);
-    quad(&mut s, [[-1.5, -1.2, 0.], [1.5, -1.2, 0.], [1.5, 2.4, 0.], [-1.5, 2.4, 0.]], floor);
+    s.quad([[-1.5, -1.2, 0.], [1.5, -1.2, 0.], [1.5, 2.4, 0.], [-1.5, 2.4, 0.]], floor);
     ball(&mut s, ball_material, false);
     yard_camera(&mut s, 0.25, "");
     s
@@ -132,7 +103,7 @@ fn rect() -> String {
 /// A large lamp, so that the path tracer finds it through glass.
 fn lamp(s: &mut Stage) {
     let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
-    quad(s, [[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
+    s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
 }
 
 #[test]
@@ -270,9 +241,8 @@ fn furnaces_stay_even() {
         s.camera(DVec3::new(0.4, -0.7, 0.2), DVec3::new(-0.3, 0.5, 0.1), 0.5, "");
         for (method, slack) in ALL {
             let settings = format!(r#","integrator":"{method}","kernel_size":2"#);
-            let got = mean(&s.render(16, 256, &settings), Pass::Combined);
-            println!("furnace by {method}: {got}");
-            assert_close(&format!("furnace by {method}"), got, 0.75, 3e-3 + 2.0 * slack);
+            let got = estimate(&s, 16, 64, Pass::Combined, &settings);
+            assert_agree(&format!("furnace by {method}"), got, (0.75, 0.0), 1e-3 + 2.0 * slack);
         }
     }
 }

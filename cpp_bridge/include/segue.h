@@ -140,8 +140,8 @@ SEGUE_API segue_status segue_scene_info(segue_scene *scene, const char **json);
 /* ---- render ------------------------------------------------------------------------------ */
 
 /* Called on the thread that runs the render, at least ten times a second while pixels are being
- * made. `json` is {"fraction","seconds","remaining","samples","estimated_error","stage"}.
- * A nonzero return cancels. */
+ * made. `json` is {"fraction","seconds","remaining","samples","estimated_error","estimated_bias",
+ * "stage"}. A nonzero return cancels. */
 typedef int (*segue_progress_fn)(void *user, const char *json);
 /* A rectangle of the film has new content (x, y from the top left, in film pixels). */
 typedef void (*segue_tile_fn)(void *user, uint32_t x, uint32_t y, uint32_t width, uint32_t height);

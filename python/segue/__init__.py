@@ -15,6 +15,7 @@ from .errors import (
     SegueError,
 )
 from .render import Render
+from .reporting import error_text
 from .scene import Attribute, Scene
 
 __version__ = "0.1.0"
@@ -31,5 +32,6 @@ __all__ = [
     "Scene",
     "SegueError",
     "engine_version",
+    "error_text",
     "library_path",
 ]

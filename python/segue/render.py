@@ -73,7 +73,8 @@ class Render:
 
         Args:
             progress: called at least ten times a second with a dictionary of fraction, seconds,
-                remaining, samples, estimated_error and stage; a true answer cancels.
+                remaining, samples, estimated_error, estimated_bias and stage; a true answer
+                cancels.
             tile: called with x, y, width, height of each rectangle of the film with new content.
 
         Returns:

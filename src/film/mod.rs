@@ -9,6 +9,7 @@
 //! A tile sums its samples in the order they are delivered, and one task at a time has it, so a picture does
 //! not depend on the number of threads as long as the samples themselves do not.
 
+mod bias;
 mod buffer;
 mod error;
 mod filter;
@@ -22,6 +23,7 @@ mod tile;
 pub use buffer::{Film, SharedTile, TILE_SIZE};
 pub use error::FilmError;
 pub use filter::{Filter, FilterKind};
+pub use noise::ErrorEstimate;
 pub use openexr::{Compression, ExrOptions};
 pub use pass::{Pass, PassSet};
 pub use rect::Rect;

@@ -1,16 +1,16 @@
-//! How noisy the picture is, told without a reference.
+//! How wrong the picture is, told without a reference: noise.
 //!
 //! The relative mean squared error of a picture `x` against the truth `r`, over pixels and channels, is
 //! `mean((x - r)² / (r² + (0.01 mean r)²))`. The squared error is estimated from the two halves of each
 //! pixel's samples, which are independent pictures of the same thing: `((a - b) / 2)²` is an unbiased
-//! estimate of the variance of their mean. Systematic error is invisible to it.
+//! estimate of the variance of their mean. Systematic error is invisible to it: see `bias`.
 //!
 //! The `r` of the denominator cannot be the pixel itself: where it happens to be dark the quotient explodes.
 //! It is the mean of the pixel's neighbourhood, drawn back to the pixel where that differs from its
 //! neighbours by more than noise explains (the local linear estimator of J.-S. Lee, "Digital Image
 //! Enhancement and Noise Filtering by Use of Local Statistics", 1980).
 
-use super::{Film, Tile};
+use super::{Film, Tile, bias};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::iter::Sum;
@@ -27,17 +27,64 @@ struct Pixel {
     variance: Vec3,
 }
 
+/// Estimated relative mean squared error of a picture: the sum of its parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorEstimate {
+    /// The part that more samples average out.
+    pub noise: f64,
+    /// The part that is systematic, as far as it is beyond doubt; `None` if the samples had no unfiltered estimates
+    /// to tell it by.
+    pub bias: Option<f64>,
+}
+
+impl ErrorEstimate {
+    /// Both parts.
+    pub fn total(&self) -> f64 {
+        self.noise + self.bias.unwrap_or(0.0)
+    }
+}
+
 impl Film {
-    /// Estimated relative mean squared error of the picture as it stands now; `None` before any pixel has
-    /// two samples (pixels with fewer are left out).
+    /// Estimated error of the picture as it stands now; `None` before any pixel has two samples (pixels with fewer
+    /// are left out).
     ///
-    /// Right on average for independent samples. Samples that are spread evenly on purpose (low-discrepancy
-    /// sequences) make the picture better than their halves tell, so it errs to the safe side there. It
-    /// reads the whole film, in parallel: ask between iterations, not for every tile.
-    pub fn estimated_relmse(&self) -> Option<f64> {
-        let mut pixels = vec![None; self.rect().area()];
-        self.visit(self.rect(), |tile, pixel, place| pixels[place] = estimate(tile, pixel));
-        relmse(&pixels, self.width() as usize)
+    /// The noise is right on average for independent samples. Samples that are spread evenly on purpose
+    /// (low-discrepancy sequences) make the picture better than their halves tell, so it errs to the safe side
+    /// there. It reads the whole film, in parallel: ask between iterations, not for every tile.
+    pub fn estimated_error(&self) -> Option<ErrorEstimate> {
+        let (width, area) = (self.width() as usize, self.rect().area());
+        let (mut pixels, mut differences) = (vec![None; area], Vec::new());
+        self.visit(self.rect(), |tile, pixel, place| {
+            pixels[place] = estimate(tile, pixel);
+            if let (Some(d), Some(_)) = (tile.differences(pixel), pixels[place]) {
+                let (_, [n, m]) = tile.halves(pixel);
+                differences.resize(area, [Vec3::ZERO; 2]);
+                differences[place] = [d[0] / n as f32, d[1] / m as f32];
+            }
+        });
+        let count = pixels.iter().flatten().count();
+        if count == 0 {
+            return None;
+        }
+        let Some(scales) = scales(&pixels, width) else {
+            // wholly black: no light was found, and nothing disagrees
+            return Some(ErrorEstimate { noise: 0.0, bias: None });
+        };
+        let square = |(p, scale): (&Option<Pixel>, &Vec3)| {
+            p.map_or(0.0, |p| (p.variance.as_dvec3() * scale.as_dvec3().powf(2.0)).element_sum())
+        };
+        // what rows give is summed in their order, whatever thread it came from
+        let rows: Vec<f64> = (pixels.par_chunks(width).zip(scales.par_chunks(width)))
+            .map(|(row, scales)| row.iter().zip(scales).map(square).sum())
+            .collect();
+        let noise = rows.iter().sum::<f64>() / (3 * count) as f64;
+        let bias = (!differences.is_empty()).then(|| {
+            for (d, scale) in differences.iter_mut().zip(&scales) {
+                *d = d.map(|d| d * scale);
+            }
+            bias::mean_square(&differences, width) / count as f64
+        });
+        Some(ErrorEstimate { noise, bias })
     }
 }
 
@@ -82,34 +129,26 @@ impl Sum for Window {
     }
 }
 
-/// The estimate for a picture of rows of `width` pixels.
-fn relmse(pixels: &[Option<Pixel>], width: usize) -> Option<f64> {
-    // what rows give is summed in their order, whatever thread it came from
+/// What differences are multiplied with to be relative ones, `1 / sqrt(r² + (0.01 mean r)²)`, for a picture of rows of
+/// `width` pixels; zero where nothing is known. `None` if all is black.
+fn scales(pixels: &[Option<Pixel>], width: usize) -> Option<Vec<Vec3>> {
     let row_sums: Vec<Window> =
         pixels.par_chunks(width).map(|row| row.iter().map(Window::from).sum()).collect();
     let known: Window = row_sums.into_iter().sum();
-    if known.count == 0.0 {
-        return None;
-    }
     let floor = (0.01 * known.mean.element_sum() / (3.0 * known.count)).powi(2);
-    if floor == 0.0 {
-        // wholly black: no light was found, and nothing disagrees
-        return Some(0.0);
-    }
-    let rows: Vec<f64> =
-        (0..pixels.len() / width).into_par_iter().map(|y| row_error(pixels, width, y, floor)).collect();
-    Some(rows.iter().sum::<f64>() / (3.0 * known.count))
+    let rows = 0..pixels.len() / width;
+    (floor > 0.0)
+        .then(|| rows.into_par_iter().flat_map_iter(|y| row_scales(pixels, width, y, floor)).collect())
 }
 
-/// Sum of the relative squared errors of row `y`, over pixels and channels.
-fn row_error(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> f64 {
+/// The same for row `y`.
+fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> Vec<Vec3> {
     let height = pixels.len() / width;
     let rows = y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(height);
     let column = |x| rows.clone().map(|row| Window::from(&pixels[row * width + x])).sum();
     let columns: Vec<Window> = (0..width).map(column).collect();
-    let mut error = 0.0;
-    for (x, pixel) in pixels[y * width..][..width].iter().enumerate() {
-        let Some(pixel) = pixel else { continue };
+    let scale = |(x, pixel): (usize, &Option<Pixel>)| {
+        let Some(pixel) = pixel else { return Vec3::ZERO };
         // plain sums, not running ones: next to a very bright pixel those would keep its rounding error
         let near = &columns[x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width)];
         let window: Window = near.iter().copied().sum();
@@ -121,9 +160,9 @@ fn row_error(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> f6
         // share of the squared difference that noise does not explain; no difference, nothing to draw back
         let trust = (1.0 - noise / (excess * excess).max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO);
         let truth = smooth + trust * excess;
-        error += (variance / (truth * truth + floor)).element_sum();
-    }
-    error
+        (truth * truth + floor).powf(-0.5).as_vec3()
+    };
+    pixels[y * width..][..width].iter().enumerate().map(scale).collect()
 }
 
 #[cfg(test)]
@@ -209,7 +248,7 @@ mod tests {
             let square = truth(x, y).as_dvec3().powf(2.0);
             (square * noise.variance() / count(x, y) as f64 / (square + floor)).element_sum()
         };
-        (film.estimated_relmse().unwrap(), known.iter().map(error).sum::<f64>() / channels)
+        (film.estimated_error().unwrap().noise, known.iter().map(error).sum::<f64>() / channels)
     }
 
     fn check(name: &str, truth: fn(u32, u32) -> Vec3, noise: Noise, count: impl Fn(u32, u32) -> u32 + Sync) {
@@ -254,15 +293,16 @@ mod tests {
 
     #[test]
     fn nothing_known_and_nothing_seen() {
+        const NONE: Option<ErrorEstimate> = Some(ErrorEstimate { noise: 0.0, bias: None });
         let film = Film::new(40, 40, PassSet::default()).unwrap();
-        assert_eq!(film.estimated_relmse(), None);
+        assert_eq!(film.estimated_error(), None);
         film.add_iteration(|_, _| Sample::default());
-        assert_eq!(film.estimated_relmse(), None);
+        assert_eq!(film.estimated_error(), None);
         film.add_iteration(|_, _| Sample::default());
-        assert_eq!(film.estimated_relmse(), Some(0.0));
+        assert_eq!(film.estimated_error(), NONE);
         let one = Film::new(1, 1, PassSet::default()).unwrap();
         (0..2).for_each(|_| one.add_iteration(|_, _| Sample { radiance: Vec3::ONE, ..Default::default() }));
-        assert_eq!(one.estimated_relmse(), Some(0.0));
+        assert_eq!(one.estimated_error(), NONE);
     }
 
     #[test]
@@ -272,7 +312,7 @@ mod tests {
             let value = |x| if (x + i) % 2 == 0 { f32::MAX } else { 0.0 };
             film.add_iteration(|x, _| Sample { radiance: Vec3::splat(value(x)), ..Default::default() });
         }
-        assert!(film.estimated_relmse().unwrap().is_finite());
+        assert!(film.estimated_error().unwrap().noise.is_finite());
     }
 
     #[test]
@@ -281,9 +321,9 @@ mod tests {
             |value, variance| Some(Pixel { mean: Vec3::splat(value), variance: Vec3::splat(variance) });
         let mut row = vec![pixel(0.1, 0.01); 40];
         row[..8].fill(None);
-        let without = row_error(&row, 40, 0, 1e-4);
+        let without = row_scales(&row, 40, 0, 1e-4);
         row[0] = pixel(1e30, 0.0);
-        assert_eq!(row_error(&row, 40, 0, 1e-4), without);
+        assert_eq!(row_scales(&row, 40, 0, 1e-4)[8..], without[8..]);
     }
 
     #[test]
@@ -297,7 +337,7 @@ mod tests {
         }
         let ask = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| film.estimated_relmse().unwrap())
+            pool.install(|| film.estimated_error().unwrap().noise)
         };
         assert_eq!(ask(1).to_bits(), ask(5).to_bits());
     }

@@ -10,6 +10,9 @@ pub struct Sample {
     pub radiance: Vec3,
     /// Coverage, in `[0,1]`.
     pub alpha: f32,
+    /// Another estimate of `radiance` from the same sample, without systematic errors; where the integrator has
+    /// one, [`super::Film::estimated_error`] tells them. It need not be finite.
+    pub unfiltered: Option<Vec3>,
     /// Part of `radiance` that reaches the camera unscattered from its emitter.
     pub emission: Vec3,
     /// Part of `radiance` that was scattered once; what is neither this nor `emission` is indirect.

@@ -16,6 +16,8 @@ pub struct Tile {
     counts: Vec<u32>,
     /// Sums of radiance of the samples of even and of odd number.
     halves: Vec<[DVec3; 2]>,
+    /// Sums, likewise, of radiance less its unfiltered estimate; empty until a sample has one.
+    differences: Vec<[Vec3; 2]>,
     /// Sums of coverage.
     alpha: Vec<f64>,
     sums: Sums,
@@ -84,6 +86,7 @@ impl Tile {
             rect,
             counts: zeros(true, n)?,
             halves: zeros(true, n)?,
+            differences: Vec::new(),
             alpha: zeros(true, n)?,
             sums: Sums {
                 normal: zeros(kept(Pass::Normal), n)?,
@@ -116,7 +119,7 @@ impl Tile {
             Pass::Uv => size_of::<Vec2>(),
             Pass::ObjectIndex | Pass::MaterialIndex => size_of::<u32>(),
         };
-        let always = size_of::<u32>() + size_of::<[DVec3; 2]>() + size_of::<f64>();
+        let always = size_of::<u32>() + size_of::<[DVec3; 2]>() + size_of::<[Vec3; 2]>() + size_of::<f64>();
         let seen = if passes.iter().any(Pass::is_first_hit) { size_of::<bool>() } else { 0 };
         (always + seen + passes.iter().map(pass_bytes).sum::<usize>()) as u64
     }
@@ -137,6 +140,11 @@ impl Tile {
         let half = self.counts[pixel] as usize & 1;
         self.counts[pixel] += 1;
         self.halves[pixel][half] += light(sample.radiance);
+        if let Some(unfiltered) = sample.unfiltered {
+            self.differences.resize(self.counts.len(), Default::default());
+            let difference = sample.radiance - unfiltered;
+            self.differences[pixel][half] += if difference.is_finite() { difference } else { Vec3::ZERO };
+        }
         self.alpha[pixel] += sample.alpha.clamp(0.0, 1.0) as f64;
         add(&mut self.sums.emission, pixel, light(sample.emission));
         add(&mut self.sums.direct, pixel, light(sample.direct));
@@ -167,6 +175,12 @@ impl Tile {
     pub(super) fn halves(&self, pixel: usize) -> ([DVec3; 2], [u32; 2]) {
         let n = self.counts[pixel];
         (self.halves[pixel], [n - n / 2, n / 2])
+    }
+
+    /// Sums of the differences from the unfiltered estimate, of the halves of a pixel; `None` where there is no such
+    /// estimate.
+    pub(super) fn differences(&self, pixel: usize) -> Option<[Vec3; 2]> {
+        self.differences.get(pixel).copied()
     }
 
     /// Writes the value of a pass, which must be one the tile keeps, to `out` (as many floats as the pass

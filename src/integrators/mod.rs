@@ -10,7 +10,9 @@ use crate::math::Sampler;
 use crate::shading::{CameraRay, Sensor, World};
 use crate::transport::report::Report;
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -118,6 +120,40 @@ impl Context<'_> {
         let film = centre + self.filter.sample(sampler.next_2d());
         let lens = if self.world.needs().depth_of_field { sampler.next_2d() } else { Vec2::ZERO };
         (self.sensor.ray(film, lens), sampler)
+    }
+}
+
+/// Light paths that one task samples.
+const LIGHT_BATCH: u32 = 1024;
+
+impl Context<'_> {
+    /// Samples so many light paths, batch by batch, each batch into a store of its own. `path` samples the path of a
+    /// number and adds the rays it takes. If it is stopped, the stores are incomplete.
+    fn light_batches<S: Default + Send>(
+        &self,
+        paths: u32,
+        path: impl Fn(u32, &mut S, &mut u64) + Sync,
+    ) -> Vec<S> {
+        let batches = (0..paths.div_ceil(LIGHT_BATCH)).into_par_iter();
+        batches.map(|b| self.task(b * LIGHT_BATCH..paths.min((b + 1) * LIGHT_BATCH), &path)).collect()
+    }
+
+    /// The same for one camera path a pixel, row by row; `path` is given the pixel.
+    fn camera_rows<S: Default + Send>(&self, path: impl Fn(u32, u32, &mut S, &mut u64) + Sync) -> Vec<S> {
+        let rows = (0..self.crop.height).into_par_iter();
+        rows.map(|y| self.task(0..self.crop.width, |x, store, rays| path(x, y, store, rays))).collect()
+    }
+
+    fn task<S: Default>(&self, paths: Range<u32>, path: impl Fn(u32, &mut S, &mut u64)) -> S {
+        let (mut store, mut rays) = (S::default(), 0);
+        for k in paths {
+            if self.stop.is_raised() {
+                break;
+            }
+            path(k, &mut store, &mut rays);
+        }
+        self.counters.rays.fetch_add(rays, Relaxed);
+        store
     }
 }
 

@@ -9,12 +9,10 @@ use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
 use crate::transport::light::LightSampler;
 use crate::transport::propagate::Reflected;
-use crate::transport::report::report;
 use crate::transport::store::{CameraStore, LightStore};
 use crate::transport::weigh::{Sampled, Weights};
 use crate::transport::{Cut, Estimator, Techniques};
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -23,8 +21,6 @@ use std::sync::atomic::Ordering::Relaxed;
 const WORTHWHILE: f64 = 2e-3;
 /// Share of the light paths that is still sampled then.
 const IDLE: f32 = 1.0 / 16.0;
-/// Light paths that one task samples.
-const LIGHT_BATCH: u32 = 1024;
 /// Keeps the random numbers of light paths apart from those of pixels.
 const LIGHT_STREAM: u32 = 0x11e4_7000;
 /// Keeps those of the grids apart from both.
@@ -125,15 +121,16 @@ impl Segment {
             (_, None) => reflected.solve(sampled, weights, &self.starts, wants_direct, cut),
             (_, Some(limit)) => reflected.solve_limited(sampled, weights, &first(), limit, cut),
         };
-        let may_idle = !context.keep_all && self.techniques.can_do_without_light_paths();
-        // few light paths bring less, as balanced weights go; what they would bring if there were all of them counts
-        let full = self.reflected.photon_share() / if self.light_is_idle { f64::from(IDLE) } else { 1.0 };
-        self.light_is_idle = may_idle && full < WORTHWHILE;
+        if !context.keep_all && self.techniques.can_do_without_light_paths() {
+            // few light paths bring less, as balanced weights go; what all of them would bring counts
+            let share = if self.light_is_idle { f64::from(IDLE) } else { 1.0 };
+            self.light_is_idle = self.reflected.photon_share() / share < WORTHWHILE;
+        }
         costs.stage("propagation", self.reflected.bytes());
         context.counters.dropped.fetch_add(self.camera.dropped, Relaxed);
         // figures that hardly change are taken ever more rarely
         if solved && (index + 1).is_power_of_two() {
-            let report = report(sampled, &self.weights, cut);
+            let report = self.reflected.report(sampled, &self.weights, cut);
             *context.counters.graph.lock().unwrap_or_else(PoisonError::into_inner) = Some(report);
             costs.stage("report", 0);
         }
@@ -150,22 +147,10 @@ impl Segment {
             next_event: self.techniques.next_event,
             goes_on: self.techniques.camera_paths,
         };
-        let crop = context.crop;
-        let rows: Vec<(CameraStore, Vec<Primary>)> = (0..crop.height)
-            .into_par_iter()
-            .map(|y| {
-                let (mut store, mut primaries, mut rays) = (CameraStore::default(), Vec::new(), 0);
-                for x in 0..crop.width {
-                    if cut.is_raised() {
-                        break;
-                    }
-                    let (ray, mut random) = context.camera_sample(x, y, index);
-                    primaries.push(sampler.path(&ray, &mut random, &mut store, &mut rays));
-                }
-                context.counters.rays.fetch_add(rays, Relaxed);
-                (store, primaries)
-            })
-            .collect();
+        let rows = context.camera_rows(|x, y, (store, primaries): &mut (CameraStore, Vec<Primary>), rays| {
+            let (ray, mut random) = context.camera_sample(x, y, index);
+            primaries.push(sampler.path(&ray, &mut random, store, rays));
+        });
         if cut.is_raised() {
             return false;
         }
@@ -190,23 +175,11 @@ impl Segment {
             next_event: self.techniques.next_event,
             estimator: self.techniques.estimator,
         };
-        let batches: Vec<LightStore> = (0..paths.div_ceil(LIGHT_BATCH))
-            .into_par_iter()
-            .map(|b| {
-                let (mut store, mut rays) = (LightStore::default(), 0);
-                for k in b * LIGHT_BATCH..paths.min((b + 1) * LIGHT_BATCH) {
-                    if cut.is_raised() {
-                        break;
-                    }
-                    // as with pixels, a path's numbers are stratified from iteration to iteration: among the paths of
-                    // one iteration they would not be independent enough of each other
-                    let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, k, index);
-                    sampler.path(&mut random, &mut store, &mut rays);
-                }
-                context.counters.rays.fetch_add(rays, Relaxed);
-                store
-            })
-            .collect();
+        let batches = context.light_batches(paths, |k, store: &mut LightStore, rays| {
+            // Leaving one out takes light paths to be independent of each other. Stratified among each other, those of
+            // an iteration are not: given one photon, fewer others lie nearby. They are from iteration to iteration.
+            sampler.path(k, &mut Sampler::new(context.seed ^ LIGHT_STREAM, k, index), store, rays);
+        });
         self.light.clear();
         batches.into_iter().for_each(|mut store| self.light.append(&mut store));
         !cut.is_raised()
@@ -234,6 +207,7 @@ impl Segment {
             };
             Sample {
                 radiance: p.light + p.weight * reflected,
+                unfiltered: self.techniques.camera_paths.then(|| p.light + p.weight * p.unfiltered),
                 alpha: p.alpha,
                 emission: p.emission,
                 direct: p.mirrored + p.weight * direct.min(reflected),

@@ -5,7 +5,7 @@ pub mod clock;
 pub mod settings;
 pub mod statistics;
 
-use crate::film::{Film, FilmError, Rect};
+use crate::film::{ErrorEstimate, Film, FilmError, Rect};
 use crate::integrators::path::Path;
 use crate::integrators::segment::Segment;
 use crate::integrators::vertices::Vertices;
@@ -54,6 +54,8 @@ pub struct Progress {
     pub samples: f64,
     /// Last estimate of the relative mean squared error.
     pub estimated_error: Option<f64>,
+    /// The part of it that is systematic, where the method can tell.
+    pub estimated_bias: Option<f64>,
     /// What is being done.
     pub stage: &'static str,
 }
@@ -89,7 +91,7 @@ struct State {
     iterations: u32,
     seconds: f64,
     cpu_seconds: f64,
-    estimated_error: Option<f64>,
+    error: Option<ErrorEstimate>,
     curve: Vec<CurvePoint>,
     next_curve_point: f64,
     stop_reason: StopReason,
@@ -136,7 +138,7 @@ impl Session {
                 iterations: 0,
                 seconds: 0.0,
                 cpu_seconds: 0.0,
-                estimated_error: None,
+                error: None,
                 curve: Vec::new(),
                 next_curve_point: 0.0,
                 stop_reason: StopReason::Running,
@@ -301,16 +303,17 @@ impl Session {
         }
         state.next_curve_point = state.seconds * CURVE_RATIO;
         let enough = state.iterations >= MIN_SAMPLES_FOR_ERROR;
-        let estimate = enough.then(|| self.pool.install(|| self.film.estimated_relmse())).flatten();
-        state.estimated_error = estimate.or(state.estimated_error);
+        let estimate = enough.then(|| self.pool.install(|| self.film.estimated_error())).flatten();
+        state.error = estimate.or(state.error);
         let point = CurvePoint {
             seconds: state.seconds,
             cpu_seconds: state.cpu_seconds,
             samples: self.mean_samples(),
-            estimated_error: estimate,
+            estimated_error: estimate.map(|e| e.total()),
+            estimated_bias: estimate.and_then(|e| e.bias),
         };
         state.curve.push(point);
-        estimate
+        point.estimated_error
     }
 
     fn mean_samples(&self) -> f64 {
@@ -324,7 +327,7 @@ impl Session {
         let by_samples = limits.samples.map(|n| samples / n as f64);
         let by_time = limits.seconds.map(|t| seconds / t);
         // the error falls as one over the samples
-        let by_error = limits.error.zip(state.estimated_error).map(|(limit, e)| limit / e);
+        let by_error = limits.error.zip(state.error).map(|(limit, e)| limit / e.total());
         let fraction =
             [by_samples, by_time, by_error].into_iter().flatten().fold(0.0, f64::max).clamp(0.0, 1.0);
         Progress {
@@ -332,7 +335,8 @@ impl Session {
             seconds,
             remaining: (fraction > 0.0).then(|| seconds * (1.0 - fraction) / fraction),
             samples,
-            estimated_error: state.estimated_error,
+            estimated_error: state.error.map(|e| e.total()),
+            estimated_bias: state.error.and_then(|e| e.bias),
             stage: "rendering",
         }
     }
@@ -372,7 +376,8 @@ impl Session {
             non_finite: self.film.rejected_samples(),
             dropped: self.counters.dropped.load(Relaxed),
             graph: locked(&self.counters.graph).clone(),
-            estimated_error: state.estimated_error,
+            estimated_error: state.error.map(|e| e.total()),
+            estimated_bias: state.error.and_then(|e| e.bias),
             threads: self.pool.current_num_threads(),
             seed: self.settings.seed,
             width: self.film.width(),

@@ -24,6 +24,8 @@ pub struct CurvePoint {
     pub samples: f64,
     /// Estimated relative mean squared error; absent while there are too few samples to tell.
     pub estimated_error: Option<f64>,
+    /// The part of it that is systematic, where the method can tell.
+    pub estimated_bias: Option<f64>,
 }
 
 /// Why a render came to its end.
@@ -59,6 +61,7 @@ pub struct Statistics {
     pub dropped: u64,
     pub graph: Option<Report>,
     pub estimated_error: Option<f64>,
+    pub estimated_bias: Option<f64>,
     pub threads: usize,
     pub seed: u32,
     pub width: u32,

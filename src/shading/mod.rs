@@ -20,5 +20,5 @@ pub use class::SurfaceClass;
 pub use light_ray::{LightRay, SourceDensity};
 pub use ray::{LightPoint, LightSample, Piece};
 pub use sensor::{CameraRay, Sensor, SensorView};
-pub use surface::SurfacePoint;
+pub use surface::{Address, SurfacePoint};
 pub use world::{BuildCost, Shaded, Vertex, World, WorldError};

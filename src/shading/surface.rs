@@ -24,6 +24,17 @@ pub struct SurfacePoint {
     pub at: MeshPoint,
 }
 
+/// Which point of which surface: enough to find it again.
+#[derive(Clone, Copy, Debug)]
+pub struct Address {
+    /// Instance.
+    pub instance: u32,
+    /// Triangle of its mesh.
+    pub triangle: u32,
+    /// Barycentrics in the triangle.
+    pub barycentrics: Vec2,
+}
+
 /// A point of a mesh in the world, as the ray tracer sees it.
 pub fn place(scene: &Scene, accel: &Accel, instance: u32, at: &MeshPoint) -> Place {
     let mesh = &scene.meshes[at.mesh as usize];
@@ -47,6 +58,11 @@ pub fn normalize_any(v: Vec3) -> Vec3 {
 }
 
 impl SurfacePoint {
+    /// Where to find it again.
+    pub fn address(&self) -> Address {
+        Address { instance: self.instance, triangle: self.at.triangle, barycentrics: self.at.barycentrics }
+    }
+
     /// The surface where a ray hit.
     pub fn new(scene: &Scene, accel: &Accel, hit: &Hit) -> Self {
         let group = scene.group(hit.instance);

@@ -7,7 +7,7 @@ use super::emissive::emissive_triangles;
 use super::emitters::{EmitterHit, Emitters, Incident, MeshTriangle, Receiver, SceneBounds};
 use super::material::Materials;
 use super::ray::{LightPoint, LightSample, Piece, Target};
-use super::surface::{SurfacePoint, place};
+use super::surface::{Address, SurfacePoint, place};
 use super::texture::{MeshPoint, interpolate};
 use crate::accel::offset::SurfacePoint as Place;
 use crate::accel::{Accel, AccelError, Hit, InstanceGeometry, MeshGeometry, Ray};
@@ -172,13 +172,15 @@ impl World {
     }
 
     /// The surface at a point of an instance's mesh.
-    pub fn surface(&self, instance: u32, triangle: u32, barycentrics: Vec2) -> SurfacePoint {
+    pub fn surface(&self, at: &Address) -> SurfacePoint {
+        let Address { instance, triangle, barycentrics } = *at;
         let hit = Hit { t: 0.0, instance, triangle, u: barycentrics.x, v: barycentrics.y };
         SurfacePoint::new(&self.scene, &self.accel, &hit)
     }
 
     /// Corners of an instance's triangle, scene space, if it has one shading normal.
-    pub fn flat_triangle(&self, instance: u32, triangle: u32) -> Option<[Vec3; 3]> {
+    pub fn flat_triangle(&self, at: &Address) -> Option<[Vec3; 3]> {
+        let Address { instance, triangle, .. } = *at;
         let index = self.scene.group(instance).mesh;
         let mesh = &self.scene.meshes[index as usize];
         if let Some(normals) = &mesh.normals {

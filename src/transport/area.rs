@@ -10,6 +10,8 @@ use glam::{Vec2, Vec3};
 pub const MANY_POINTS: u32 = 8;
 /// The same where the area only decides how much each technique counts.
 pub const FEW_POINTS: u32 = 3;
+/// The same where areas stand in densities themselves, so that both an area and its reciprocal have to be right.
+pub const MOST_POINTS: u32 = 64;
 /// Most points that are tried to find them.
 const MOST_TRIES: u32 = 256;
 /// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
@@ -44,11 +46,12 @@ impl Cell<'_> {
         mut members: impl Iterator<Item = &'m Arrival>,
     ) -> Option<f32> {
         let r = self.representative;
-        if self.parted.is_some() || !members.all(|a| (a.instance, a.triangle) == (r.instance, r.triangle)) {
+        let triangle = |a: &Arrival| (a.at.instance, a.at.triangle);
+        if self.parted.is_some() || !members.all(|a| triangle(a) == triangle(r)) {
             return None;
         }
         let (low, edge) = self.grid.place(&self.voxel);
-        let [a, b, c] = world.flat_triangle(r.instance, r.triangle)?.map(|v| (v - low) / edge);
+        let [a, b, c] = world.flat_triangle(&r.at)?.map(|v| (v - low) / edge);
         let n = (b - a).cross(c - a).normalize_or_zero();
         if n == Vec3::ZERO {
             return None;
@@ -114,7 +117,7 @@ impl Cell<'_> {
         }
         // the cluster has arrivals, so it is somewhere between the points
         if found == 0 {
-            return self.plane_cut(at) / tries as f32;
+            return self.plane_cut(at).min(edge * edge / tries as f32);
         }
         // the reciprocal of a mean of slopes is too large by their variance over their number, to first order
         let spread =

@@ -1,6 +1,7 @@
 //! Sequential sampling from the camera, with a next-event segment at every arrival (S8).
 
 use super::arrival::{arrival, early_survival};
+use super::own_path::OwnPath;
 use super::store::{CameraStore, EmissionHit, NextEvent, Outgoing};
 use super::walk::{Chain, End, Follow, Witness};
 use crate::film::FirstHit;
@@ -22,6 +23,8 @@ pub struct Primary {
     pub weight: Vec3,
     /// Dirac lobes that it passes.
     pub passages: u32,
+    /// Basic radiance that the path by itself finds to be reflected there.
+    pub unfiltered: Vec3,
     /// Radiance of the lights on it.
     pub light: Vec3,
     /// That of lights seen straight.
@@ -39,6 +42,7 @@ impl Primary {
         arrival: None,
         weight: Vec3::ZERO,
         passages: 0,
+        unfiltered: Vec3::ZERO,
         light: Vec3::ZERO,
         emission: Vec3::ZERO,
         mirrored: Vec3::ZERO,
@@ -183,6 +187,7 @@ impl CameraSampler<'_> {
         primary.weight = chain.throughput / chain.forward;
         primary.passages = chain.passages;
         let mut inverse_n2 = 1.0 / (chain.index * chain.index);
+        let mut own = OwnPath::new(chain.passages, self.max_depth);
         let follow = Follow { from_camera: false, ..follow };
         loop {
             let index = store.arrivals.len();
@@ -199,21 +204,25 @@ impl CameraSampler<'_> {
             };
             let sound = next_event.light.is_finite() && next_event.next_event_pdf.is_finite();
             store.dropped += u64::from(!sound);
-            store.next_events.push(if sound { next_event } else { NextEvent::default() });
-            store.inverse_n2.push(inverse_n2);
+            let next_event = if sound { next_event } else { NextEvent::default() };
             let bsdf = &end.vertex.bsdf;
+            own.see_next_event(&next_event, arrived.survival, |direction| bsdf.eval(end.wo, direction));
+            store.next_events.push(next_event);
+            store.inverse_n2.push(inverse_n2);
             let u = sampler.next_3d();
             let goes_on = sampler.next_1d() < arrived.survival;
             let sample = if goes_on { bsdf.sample_continuous(end.wo, Walk::Camera, u) } else { None };
             arrived.goes_on = sample.is_some();
+            let survival = arrived.survival;
             store.arrivals.push(arrived);
             let Some(sample) = sample else {
                 store.outgoing.push(Outgoing::default());
-                return primary;
+                break;
             };
             let direction = sample.direction;
             let start_n2 = inverse_n2 / (sample.eta * sample.eta);
             let light_end = end.probability_from(self.world, direction);
+            let met = store.hits.len();
             let mut meeting = Meeting {
                 world: self.world,
                 hits: &mut store.hits,
@@ -227,6 +236,9 @@ impl CameraSampler<'_> {
             };
             let piece = Piece::leaving(&end.hit, direction);
             let (chain, next) = follow.segment(piece, sampler, &mut meeting, rays);
+            let density = survival * sample.pdf.value();
+            own.meet(&store.hits[met..], sample.value, density);
+            own.go_on(&chain, sample.value, density);
             let squeeze = 1.0 / (chain.index * chain.index);
             store.outgoing.push(Outgoing {
                 direction,
@@ -239,10 +251,12 @@ impl CameraSampler<'_> {
             });
             match next {
                 Some(e) => end = e,
-                None => return primary,
+                None => break,
             }
             inverse_n2 = start_n2 * squeeze;
         }
+        primary.unfiltered = own.light;
+        primary
     }
 
     /// A next-event segment; its light is zero where none arrives.

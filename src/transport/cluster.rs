@@ -1,7 +1,7 @@
 //! Clusters: arrivals that share a voxel, a bin of normals and a class of surface.
 
 use super::Cut;
-use super::area::{Cell, FEW_POINTS, MANY_POINTS};
+use super::area::{Cell, FEW_POINTS, MANY_POINTS, MOST_POINTS};
 use super::grid::Grid;
 use super::store::Arrival;
 use crate::math::sampler::hash;
@@ -262,8 +262,8 @@ fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut C
         exact.unwrap_or_else(|| cell.coverage(world, points, &|p, n| hub.is_hidden(world, p, n))) / parts
     };
     if areas == Areas::True {
-        c.area = estimate(MANY_POINTS);
-        c.inverse_area = 1.0 / c.area;
+        c.area = estimate(MOST_POINTS);
+        c.inverse_area = 1.0 / estimate(MANY_POINTS);
         return;
     }
     c.area = estimate(FEW_POINTS);

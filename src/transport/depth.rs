@@ -21,9 +21,30 @@ struct Level {
     photons: Vec<FromPhotons>,
 }
 
-/// The level that many sweeps before the last, if there was one.
-fn back(levels: &VecDeque<Level>, sweeps: u32) -> Option<&Level> {
-    levels.iter().rev().nth(sweeps as usize)
+/// The results of the last sweeps, as many as the longest chain reads back.
+pub(super) struct Levels<T> {
+    ring: VecDeque<T>,
+    kept: usize,
+}
+
+impl<T> Levels<T> {
+    /// With the start, for chains of at most so many passages.
+    pub fn new(start: T, passages: u32) -> Self {
+        Self { ring: VecDeque::from([start]), kept: 1 + passages as usize }
+    }
+
+    /// Adds the result of a sweep, and forgets what nobody reads any more.
+    pub fn push(&mut self, level: T) {
+        self.ring.push_back(level);
+        if self.ring.len() > self.kept {
+            self.ring.pop_front();
+        }
+    }
+
+    /// The level that many sweeps before the last, if there was one.
+    pub fn back(&self, sweeps: u32) -> Option<&T> {
+        self.ring.iter().rev().nth(sweeps as usize)
+    }
 }
 
 /// Most passages of a segment of the camera's paths; `first` as in [`Reflected::solve_limited`].
@@ -44,12 +65,11 @@ impl Reflected {
     ) -> bool {
         let n = s.camera.arrivals.len();
         let nothing = || vec![Vec3::ZERO; n];
-        // as far back as the longest chain reads
-        let kept = 1 + longest_chain(s, first) as usize;
-        let mut levels =
-            VecDeque::from([Level { carried: nothing(), photons: vec![FromPhotons::default(); n] }]);
+        let start = Level { carried: nothing(), photons: vec![FromPhotons::default(); n] };
+        let mut levels = Levels::new(start, longest_chain(s, first));
         self.direct = nothing();
-        let (constants, values) = (segments(s, w), photon_values(s, w));
+        self.segments = segments(s, w);
+        let values = photon_values(s, w);
         for k in 1..=bounces {
             if cut.is_raised() {
                 return false;
@@ -57,24 +77,21 @@ impl Reflected {
             let brought = per_index(s, |i| {
                 // light met after k passages has bounced once more on its way
                 let met = emitted(s, w, i, Some(k - 1));
-                let level = back(&levels, s.camera.outgoing[i].passages).filter(|_| has_end(s, i));
-                constants[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1].brought)))
+                let level = levels.back(s.camera.outgoing[i].passages).filter(|_| has_end(s, i));
+                self.segments[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1].brought)))
             });
-            let photons = gather_photons(s, w, &constants, &values, cut, |p| p.bounces < k);
-            let first_photons = if k == 1 { photons.clone() } else { Vec::new() };
-            levels.push_back(Level { carried: gather(s, w, &brought, cut), photons });
-            if levels.len() > kept {
-                levels.pop_front();
-            }
+            let photons = gather_photons(s, w, &self.segments, &values, cut, |p| p.bounces < k);
+            let carried = gather(s, w, &brought, cut);
             if k == 1 {
-                self.direct.clone_from(&levels[levels.len() - 1].carried);
-                self.direct.par_iter_mut().zip(first_photons).for_each(|(d, p)| *d += p.reflected);
+                self.direct.clone_from(&carried);
+                self.direct.par_iter_mut().zip(&photons).for_each(|(d, p)| *d += p.reflected);
             }
+            levels.push(Level { carried, photons });
         }
         (self.carried, self.photons) = (nothing(), vec![FromPhotons::default(); n]);
         for &(arrival, passages) in first {
             let i = arrival as usize;
-            if let Some(level) = back(&levels, passages) {
+            if let Some(level) = levels.back(passages) {
                 (self.carried[i], self.photons[i]) = (level.carried[i], level.photons[i]);
             }
         }

@@ -146,9 +146,21 @@ pub(super) fn gather_photons(
     wanted: impl Fn(&Photon) -> bool + Sync,
 ) -> Vec<FromPhotons> {
     let light = |j: usize| if wanted(&s.light.photons[j]) { values[j] } else { Vec3::ZERO };
+    // what arrives, and the mean `q` of a photon's path there, as much as each brings: exact to first order
     let shared = per_diffuse_cluster(s, cut, |c| {
-        let arriving = s.lights(c).map(|j| (light(j) * s.light.arrivals[j].back_pdf).as_dvec3());
-        arriving.sum::<DVec3>().as_vec3()
+        if c.cameras == 0 || c.lights == 0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let mut own: Vec<f32> = s.lights(c).map(|j| s.light.arrivals[j].survival).collect();
+        s.sum_over_paths(c, &mut own);
+        let (mut arriving, mut left_out) = (DVec3::ZERO, 0.0);
+        for (j, own) in s.lights(c).zip(own) {
+            let value = (light(j) * s.light.arrivals[j].back_pdf).as_dvec3();
+            arriving += value;
+            left_out += value.element_sum() * f64::from(own);
+        }
+        let total = arriving.element_sum();
+        (arriving.as_vec3(), if total > 0.0 { (left_out / total) as f32 } else { 0.0 })
     });
     per_arrival(s, cut, |i, k, c| {
         if c.lights == 0 {
@@ -158,7 +170,7 @@ pub(super) fn gather_photons(
         let p_light = w.densities[place as usize].light;
         let before = i.checked_sub(1).filter(|&b| has_end(s, b));
         let arriving = before.map(|b| (&segments[b], s.camera.outgoing[b].throughput));
-        // factor on light of a photon whose own part of `P_light` is `own`
+        // factor on light of a photon whose path's part of `P_light` is `own`
         let carry = |own: f32| match arriving {
             Some((a, throughput)) => throughput * reciprocal(a.camera + a.light * (p_light - own).max(0.0)),
             None => Vec3::ZERO,
@@ -166,8 +178,9 @@ pub(super) fn gather_photons(
         let mut sum = FromPhotons::default();
         match c.class {
             SurfaceClass::Diffuse => {
-                sum.reflected = s.camera.arrivals[i].reflectance * shared[k];
-                sum.brought = carry(p_light / c.lights as f32) * sum.reflected;
+                let (a, (arriving, own)) = (&s.camera.arrivals[i], shared[k]);
+                sum.reflected = a.reflectance * arriving;
+                sum.brought = carry(own * a.back_pdf) * sum.reflected;
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (place - c.first) as usize;
@@ -209,11 +222,15 @@ pub(super) fn per_index<T: Send>(s: Sampled, f: impl Fn(usize) -> T + Sync + Sen
     (0..s.camera.arrivals.len()).into_par_iter().with_min_len(GRAIN).map(f).collect()
 }
 
-/// Something for every diffuse cluster, zero for the others.
-pub(super) fn per_diffuse_cluster(s: Sampled, cut: &Cut, f: impl Fn(&Cluster) -> Vec3 + Sync) -> Vec<Vec3> {
+/// Something for every diffuse cluster, nothing for the others.
+pub(super) fn per_diffuse_cluster<T: Default + Send>(
+    s: Sampled,
+    cut: &Cut,
+    f: impl Fn(&Cluster) -> T + Sync,
+) -> Vec<T> {
     let one = |c: &Cluster| match c.class == SurfaceClass::Diffuse && !cut.is_raised() {
         true => f(c),
-        false => Vec3::ZERO,
+        false => T::default(),
     };
     s.clusters.clusters.par_iter().with_min_len(GRAIN).map(one).collect()
 }

@@ -22,8 +22,8 @@ pub struct LightSampler<'a> {
 }
 
 impl LightSampler<'_> {
-    /// Samples one path into the store. Adds the rays it takes to `rays`.
-    pub fn path(&self, sampler: &mut Sampler, store: &mut LightStore, rays: &mut u64) {
+    /// Samples path number `path` into the store. Adds the rays it takes to `rays`.
+    pub fn path(&self, path: u32, sampler: &mut Sampler, store: &mut LightStore, rays: &mut u64) {
         let (u, place, direction) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
         let Some(ray) = self.world.sample_emission(u, place, direction) else { return };
         let follow = Follow { world: self.world, walk: Walk::Light, from_camera: false };
@@ -48,7 +48,8 @@ impl LightSampler<'_> {
             let (direction, pdf) = sample.map_or((Vec3::ZERO, 0.0), |s| (s.direction, s.pdf.value()));
             // the camera segment that gathers it is as opaque at its end
             let flux_there = flux / end.opacity;
-            store.photons.push(Photon { flux: flux_there, bounces, rivals, camera_choices, direction, pdf });
+            let photon = Photon { path, flux: flux_there, bounces, rivals, camera_choices, direction, pdf };
+            store.photons.push(photon);
             let Some(sample) = sample else { return };
             let value = match arrived.class {
                 SurfaceClass::Diffuse => sample.value,

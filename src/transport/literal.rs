@@ -6,7 +6,7 @@
 //! few. `propagate` leaves it out instead.
 
 use super::Cut;
-use super::depth::longest_chain;
+use super::depth::{Levels, longest_chain};
 use super::exchange::{
     FromPhotons, GRAIN, Segment, emitted, has_end, per_diffuse_cluster, photon_value, reciprocal, segments,
 };
@@ -17,7 +17,6 @@ use crate::math::luminance;
 use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::collections::VecDeque;
 
 /// Change of the mean, relative to it, below which sweeping stops. The start is nothing, so it is finer than that of
 /// the other estimator.
@@ -36,12 +35,13 @@ impl Reflected {
         bounces: Option<u32>,
         cut: &Cut,
     ) -> bool {
-        let recursion = Recursion { s, w, segments: segments(s, w), photons: photon_segments(s, w) };
+        self.segments = segments(s, w);
+        let recursion = Recursion { s, w, segments: &self.segments, photons: photon_segments(s, w) };
         // without a limit a chain counts no more than a straight segment
         let sweeps_of = |passages: u32| if bounces.is_some() { passages } else { 0 };
         let chains = recursion.photons.iter().map(|p| p.passages).max().unwrap_or(0);
-        let kept = 1 + sweeps_of(chains.max(longest_chain(s, first))) as usize;
-        let mut levels = VecDeque::from([vec![Vec3::ZERO; s.clusters.of.len()]]);
+        let start = vec![Vec3::ZERO; s.clusters.of.len()];
+        let mut levels = Levels::new(start, sweeps_of(chains.max(longest_chain(s, first))));
         let n = s.camera.arrivals.len();
         self.direct = vec![Vec3::ZERO; n];
         let mut before = 0.0;
@@ -50,19 +50,14 @@ impl Reflected {
                 return false;
             }
             let most = (bounces.is_some() || k == 1).then_some(k - 1);
-            let read = |i: usize, passages: u32| {
-                levels.iter().rev().nth(sweeps_of(passages) as usize).map_or(Vec3::ZERO, |l: &Vec<Vec3>| l[i])
-            };
+            let read =
+                |i: usize, passages: u32| levels.back(sweeps_of(passages)).map_or(Vec3::ZERO, |l| l[i]);
             let next = recursion.sweep(read, most, cut);
             if k == 1 {
                 self.direct.copy_from_slice(&next[..n]);
             }
-            levels.push_back(next);
-            if levels.len() > kept {
-                levels.pop_front();
-            }
-            let last = &levels[levels.len() - 1];
-            let now = first.iter().map(|&(i, _)| f64::from(luminance(last[i as usize]))).sum::<f64>();
+            let now = first.iter().map(|&(i, _)| f64::from(luminance(next[i as usize]))).sum::<f64>();
+            levels.push(next);
             let change = (now - before).abs();
             before = now;
             if bounces.is_none() && k >= SWEEPS[0] && change <= TOLERANCE * now {
@@ -71,7 +66,7 @@ impl Reflected {
         }
         (self.carried, self.photons) = (vec![Vec3::ZERO; n], vec![FromPhotons::default(); n]);
         for &(arrival, passages) in first {
-            if let Some(level) = levels.iter().rev().nth(sweeps_of(passages) as usize) {
+            if let Some(level) = levels.back(sweeps_of(passages)) {
                 self.carried[arrival as usize] = level[arrival as usize];
             }
         }
@@ -103,8 +98,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
             };
         };
         let before = j - 1;
-        let own = s.light.arrivals[before].survival * s.light.photons[before].pdf;
-        let p_light = w.densities[s.clusters.place[n + before] as usize].light + own;
+        let p_light = w.densities[s.clusters.place[n + before] as usize].light;
         let p_camera = photon.camera_choices * w.densities[s.clusters.place[n + j] as usize].camera;
         let light = light_choices * squeeze * p_light / s.cluster_of(n + before).area;
         LightSegment {
@@ -120,7 +114,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
 struct Recursion<'a> {
     s: Sampled<'a>,
     w: &'a Weights,
-    segments: Vec<Segment>,
+    segments: &'a [Segment],
     photons: Vec<LightSegment>,
 }
 

@@ -11,6 +11,7 @@ pub mod grid;
 pub mod kernel;
 pub mod light;
 mod literal;
+mod own_path;
 pub mod propagate;
 pub mod report;
 pub mod store;
@@ -66,7 +67,7 @@ impl Default for Techniques {
         Self {
             estimator: Estimator::default(),
             kernel: kernel::Kernel::default(),
-            light_paths: 0.5,
+            light_paths: 1.0,
             next_event: true,
             camera_paths: true,
         }

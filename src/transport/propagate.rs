@@ -29,7 +29,8 @@ pub struct Reflected {
     pub photons: Vec<FromPhotons>,
     /// Of light that was scattered nowhere else; empty if nobody asked.
     pub direct: Vec<Vec3>,
-    segments: Vec<Segment>,
+    /// The constants of camera segments.
+    pub(super) segments: Vec<Segment>,
 }
 
 impl Reflected {
@@ -40,10 +41,11 @@ impl Reflected {
         let values = photon_values(s, w);
         self.photons = gather_photons(s, w, &self.segments, &values, cut, |_| true);
         self.carried = self.own_tails(s, w, starts, cut);
-        let mean = |v: &[Vec3]| starts.iter().map(|&i| f64::from(luminance(v[i as usize]))).sum::<f64>();
-        let constant =
-            starts.iter().map(|&i| f64::from(luminance(self.photons[i as usize].reflected))).sum::<f64>();
-        let mut before = mean(&self.carried);
+        let total = |light: &dyn Fn(usize) -> Vec3| {
+            starts.iter().map(|&i| f64::from(luminance(light(i as usize)))).sum::<f64>()
+        };
+        let constant = total(&|i| self.photons[i].reflected);
+        let mut before = total(&|i| self.carried[i]);
         for sweep in 1..=SWEEPS[1] {
             if cut.is_raised() {
                 return false;
@@ -54,7 +56,7 @@ impl Reflected {
                 segment.value(segment.emitted, end)
             });
             self.carried = gather(s, w, &brought, cut);
-            let now = mean(&self.carried);
+            let now = total(&|i| self.carried[i]);
             let change = (now - before).abs();
             before = now;
             if sweep >= SWEEPS[0] && change <= TOLERANCE * (now + constant) {

@@ -2,7 +2,8 @@
 //! operator feeds back. Its spectral radius is at most its largest row sum.
 
 use super::Cut;
-use super::exchange::{per_arrival, per_diffuse_cluster, segments};
+use super::exchange::{Segment, per_arrival, per_diffuse_cluster};
+use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
@@ -30,8 +31,16 @@ pub struct RowSums {
     pub largest: f32,
 }
 
-/// Looks at an iteration. If it was stopped, what it says is incomplete.
-pub fn report(s: Sampled, w: &Weights, cut: &Cut) -> Report {
+impl Reflected {
+    /// Looks at the iteration that was solved. If it is stopped, what it says is incomplete.
+    pub fn report(&self, s: Sampled, w: &Weights, cut: &Cut) -> Report {
+        let (sizes, largest) = sizes(s);
+        Report { sizes, largest, row_sums: row_sums(s, w, &self.segments, cut) }
+    }
+}
+
+/// Clusters by the logarithm of their size, and the largest size.
+fn sizes(s: Sampled) -> (Vec<u64>, u32) {
     let mut sizes = Vec::new();
     let mut largest = 0;
     for c in &s.clusters.clusters {
@@ -43,11 +52,10 @@ pub fn report(s: Sampled, w: &Weights, cut: &Cut) -> Report {
         }
         sizes[k] += 1;
     }
-    Report { sizes, largest, row_sums: row_sums(s, w, cut) }
+    (sizes, largest)
 }
 
-fn row_sums(s: Sampled, w: &Weights, cut: &Cut) -> RowSums {
-    let constants = segments(s, w);
+fn row_sums(s: Sampled, w: &Weights, constants: &[Segment], cut: &Cut) -> RowSums {
     let shared = per_diffuse_cluster(s, cut, |c| {
         let leaving = s.cameras(c).map(|i| (constants[i].carry * s.camera.outgoing[i].pdf).as_dvec3());
         leaving.sum::<DVec3>().as_vec3() / c.area

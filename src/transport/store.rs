@@ -6,8 +6,8 @@
 //! is basic radiance `L / n^2`, with the camera in a medium of index one.
 
 use crate::shading::bsdf::Bsdf;
-use crate::shading::{SurfaceClass, World};
-use glam::{Vec2, Vec3};
+use crate::shading::{Address, SurfaceClass, World};
+use glam::Vec3;
 
 /// The end of a segment, from the camera or from a light.
 #[derive(Clone, Copy, Debug)]
@@ -18,12 +18,8 @@ pub struct Arrival {
     pub normal: Vec3,
     /// Direction back along the segment.
     pub wo: Vec3,
-    /// Instance, triangle and barycentrics of the surface.
-    pub instance: u32,
-    /// See `instance`.
-    pub triangle: u32,
-    /// See `instance`.
-    pub barycentrics: Vec2,
+    /// The surface.
+    pub at: Address,
     /// Reflectance, of a diffuse surface.
     pub reflectance: Vec3,
     /// Of a diffuse surface: density with which its lobe draws `wo`.
@@ -44,7 +40,7 @@ impl Arrival {
 
     /// The same, looked at from elsewhere.
     pub fn bsdf_from(&self, world: &World, wo: Vec3) -> Bsdf {
-        world.bsdf(&world.surface(self.instance, self.triangle, self.barycentrics), wo)
+        world.bsdf(&world.surface(&self.at), wo)
     }
 }
 
@@ -104,6 +100,8 @@ pub struct EmissionHit {
 /// What an arrival of a light path carries.
 #[derive(Clone, Copy, Debug)]
 pub struct Photon {
+    /// Its light path.
+    pub path: u32,
     /// Flux, W.
     pub flux: Vec3,
     /// Times that the light has been scattered on its way here.

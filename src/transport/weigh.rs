@@ -12,6 +12,7 @@ use crate::shading::bsdf::Bsdf;
 use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Densities of one arrival.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,7 +20,7 @@ pub struct Density {
     /// `P_cam` of the segment that leaves a camera arrival, or that brought a light arrival.
     pub camera: f32,
     /// `P_light` of the segment that brought a camera arrival; of the segment that leaves a light arrival, without
-    /// that arrival's own part.
+    /// the part of its own path, unless the literal recursion asks.
     pub light: f32,
 }
 
@@ -83,6 +84,29 @@ impl<'a> Sampled<'a> {
         let (order, first) = (&self.clusters.order, self.camera.arrivals.len());
         c.light_places().map(move |k| order[k] as usize - first)
     }
+
+    /// Path of light arrival `j`.
+    #[inline]
+    pub fn path(&self, j: usize) -> u32 {
+        self.light.photons[j].path
+    }
+
+    /// Replaces the value of every light arrival of the cluster, in their order, by the sum of those of its path: what
+    /// is left out with it. A path that returns to a cluster is no more independent of itself than a photon is.
+    pub fn sum_over_paths(&self, c: &Cluster, values: &mut [f32]) {
+        // arrivals are in the order of their numbers, so those of a path follow each other
+        let mut paths = self.lights(c).map(|j| self.path(j)).peekable();
+        let mut start = 0;
+        while let Some(path) = paths.next() {
+            let mut end = start + 1;
+            while paths.next_if_eq(&path).is_some() {
+                end += 1;
+            }
+            let sum = values[start..end].iter().sum();
+            values[start..end].fill(sum);
+            start = end;
+        }
+    }
 }
 
 #[derive(Default)]
@@ -112,7 +136,7 @@ impl Weights {
                     }
                     batch.starts.push((batch.values.len() as u32, batch.owns.len() as u32));
                     match c.class {
-                        SurfaceClass::Diffuse => diffuse(s, c, &mut batch),
+                        SurfaceClass::Diffuse => diffuse(s, c, estimator, &mut batch),
                         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                             paired(s, c, estimator, &mut batch)
                         }
@@ -153,8 +177,8 @@ impl Weights {
         &self.values[m.batch as usize][start..start + m.columns as usize]
     }
 
-    /// Of the segment that brought the `row`-th camera arrival of a cluster that is not diffuse: every light
-    /// arrival's part of `P_light`.
+    /// Of the segment that brought the `row`-th camera arrival of a cluster that is not diffuse: for every light arrival,
+    /// its path's part of `P_light`.
     #[inline]
     pub fn own(&self, cluster: usize, row: usize) -> &[f32] {
         let m = &self.matrices[cluster];
@@ -180,10 +204,10 @@ fn next_event_value(n: &NextEvent, p_cam: f32, c: &Cluster) -> Vec3 {
     if density > 0.0 { n.light / density } else { Vec3::ZERO }
 }
 
-fn diffuse(s: Sampled, c: &Cluster, batch: &mut Batch) {
+fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let sum = |q: &mut dyn Iterator<Item = f32>| q.map(f64::from).sum::<f64>();
     let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals[i].survival)) as f32;
-    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals[j].survival));
+    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals[j].survival)) as f32;
     let mut arriving = DVec3::ZERO;
     for i in s.cameras(c) {
         let n = &s.camera.next_events[i];
@@ -194,18 +218,17 @@ fn diffuse(s: Sampled, c: &Cluster, batch: &mut Batch) {
     let arriving = arriving.as_vec3() / c.area;
     for i in s.cameras(c) {
         let a = &s.camera.arrivals[i];
-        batch.densities.push(Density {
-            camera: q_camera * s.camera.outgoing[i].pdf,
-            light: q_light as f32 * a.back_pdf,
-        });
+        batch
+            .densities
+            .push(Density { camera: q_camera * s.camera.outgoing[i].pdf, light: q_light * a.back_pdf });
         batch.direct.push(a.reflectance * arriving);
     }
-    for j in s.lights(c) {
+    let mut own: Vec<f32> = s.lights(c).map(|j| s.light.arrivals[j].survival).collect();
+    s.sum_over_paths(c, &mut own);
+    for (j, own) in s.lights(c).zip(own) {
         let a = &s.light.arrivals[j];
-        batch.densities.push(Density {
-            camera: q_camera * a.back_pdf,
-            light: (q_light - f64::from(a.survival)) as f32 * s.light.photons[j].pdf,
-        });
+        let q = if estimator == Estimator::Literal { q_light } else { (q_light - own).max(0.0) };
+        batch.densities.push(Density { camera: q_camera * a.back_pdf, light: q * s.light.photons[j].pdf });
         batch.direct.push(a.reflectance * arriving);
     }
 }
@@ -218,19 +241,28 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     batch.densities.resize(first + n + m, Density::default());
     batch.direct.resize(first + n + m, Vec3::ZERO);
     let matrix = batch.values.len();
-    let rows = match estimator {
-        Estimator::LeaveOneOut => n,
-        Estimator::Literal => n + m,
-    };
+    // who gathers, as seen from where, and with which `q`: a light arrival's path is no technique of the camera
+    let mut gatherers: Vec<(Cow<Bsdf>, Vec3, f32)> = cameras
+        .iter()
+        .map(|(i, bsdf)| (Cow::Borrowed(bsdf), s.camera.arrivals[*i].wo, s.camera.arrivals[*i].survival))
+        .collect();
+    if estimator == Estimator::Literal {
+        gatherers.extend(s.lights(c).map(|j| {
+            let a = &s.light.arrivals[j];
+            // nobody reads what one gathers whose path ends
+            let wo = if a.goes_on { s.light.photons[j].direction } else { a.wo };
+            (Cow::Owned(a.bsdf_from(s.world, wo)), wo, 0.0)
+        }));
+    }
+    let rows = gatherers.len();
     let owns = batch.owns.len();
     batch.owns.resize(owns + n * m, 0.0);
     batch.values.resize(matrix + rows * (n + m), Vec3::ZERO);
     let densities = &mut batch.densities[first..];
     let mut next_event_pdfs = vec![0.0; n];
     let mut next_event_values = vec![Vec3::ZERO; rows * n];
-    for (row, (t, bsdf)) in cameras.iter().enumerate() {
-        let a = &s.camera.arrivals[*t];
-        let look = |w: Vec3| (a.survival * bsdf.continuous_pdf(a.wo, w).0, bsdf.eval(a.wo, w));
+    for (row, (bsdf, wo, q)) in gatherers.iter().enumerate() {
+        let look = |w: Vec3| (q * bsdf.continuous_pdf(*wo, w).0, bsdf.eval(*wo, w));
         for (column, (i, _)) in cameras.iter().enumerate() {
             if s.camera.arrivals[*i].goes_on {
                 let (pdf, value) = look(s.camera.outgoing[*i].direction);
@@ -248,30 +280,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             let w = s.light.arrivals[*j].wo;
             let (pdf, value) = look(w);
             densities[n + column].camera += pdf;
-            batch.values[matrix + row * (n + m) + n + column] = value / bsdf.relative_index(a.wo, w).powi(2);
-        }
-    }
-    for row in n..rows {
-        let photon = &s.light.photons[lights[row - n].0];
-        if photon.pdf <= 0.0 {
-            continue;
-        }
-        let wo = photon.direction;
-        let bsdf = s.light.arrivals[lights[row - n].0].bsdf_from(s.world, wo);
-        for (column, (i, _)) in cameras.iter().enumerate() {
-            if s.camera.arrivals[*i].goes_on {
-                let value = bsdf.eval(wo, s.camera.outgoing[*i].direction);
-                batch.values[matrix + row * (n + m) + column] = value;
-            }
-            let next_event = &s.camera.next_events[*i];
-            if next_event.next_event_pdf > 0.0 {
-                next_event_values[row * n + column] = bsdf.eval(wo, next_event.direction);
-            }
-        }
-        for (column, (j, _)) in lights.iter().enumerate() {
-            let w = s.light.arrivals[*j].wo;
-            let value = bsdf.eval(wo, w) / bsdf.relative_index(wo, w).powi(2);
-            batch.values[matrix + row * (n + m) + n + column] = value;
+            batch.values[matrix + row * (n + m) + n + column] = value / bsdf.relative_index(*wo, w).powi(2);
         }
     }
     for (t, (own, bsdf)) in lights.iter().enumerate() {
@@ -283,10 +292,14 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             batch.owns[owns + row * m + t] = part;
         }
         for (other, (j, _)) in lights.iter().enumerate() {
-            if other != t && s.light.arrivals[*j].goes_on {
+            let is_rival = estimator == Estimator::Literal || s.path(*j) != s.path(*own);
+            if is_rival && s.light.arrivals[*j].goes_on {
                 densities[n + other].light += pdf(s.light.photons[*j].direction);
             }
         }
+    }
+    for row in 0..n {
+        s.sum_over_paths(c, &mut batch.owns[owns + row * m..][..m]);
     }
     for (column, (i, _)) in cameras.iter().enumerate() {
         let next_event = &s.camera.next_events[*i];

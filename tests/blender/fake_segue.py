@@ -16,6 +16,12 @@ class SegueError(RuntimeError):
     """Mirrors `segue.SegueError`."""
 
 
+def error_text(report: dict[str, Any]) -> str:
+    """Mirrors `segue.error_text`."""
+    error = report.get("estimated_error")
+    return "error -" if error is None else f"error {error}"
+
+
 @dataclass
 class Attribute:
     """Mirrors `segue.Attribute`."""

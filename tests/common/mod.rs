@@ -84,6 +84,20 @@ impl Stage {
         self.0.add_instances(group, &[matrix(at)]).unwrap();
     }
 
+    /// A quad between four corners, counter-clockwise seen from where it faces.
+    pub fn quad(&mut self, corners: [[f32; 3]; 4], material: u32) {
+        let mesh = self.mesh(&corners.map(Vec3::from), &[0, 1, 2, 0, 2, 3], None);
+        self.place(mesh, material, DMat4::IDENTITY);
+    }
+
+    /// The corner of a room, two units wide and open to the camera's side.
+    pub fn corner(&mut self, wall: u32) {
+        self.quad([[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]], wall);
+        self.quad([[-1., 1., 0.], [1., 1., 0.], [1., 1., 2.], [-1., 1., 2.]], wall);
+        self.quad([[-1., -1., 0.], [-1., 1., 0.], [-1., 1., 2.], [-1., -1., 2.]], wall);
+        self.quad([[-1., -1., 2.], [-1., 1., 2.], [1., 1., 2.], [1., -1., 2.]], wall);
+    }
+
     /// A horizontal square of half side `size` at height 0, facing +z.
     pub fn floor(&mut self, size: f32, material: u32) {
         let p =
@@ -120,6 +134,47 @@ pub fn mean(session: &Session, pass: Pass) -> f64 {
     let colors = channels.min(3);
     let sum: f64 = values.chunks(channels).flat_map(|p| &p[..colors]).map(|&v| v as f64).sum();
     sum / (values.len() / channels * colors) as f64
+}
+
+/// Mean and its standard error.
+pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let m = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0);
+    (m, (variance / n).sqrt())
+}
+
+/// Settings of the path tracer.
+pub const PATH: &str = r#","integrator":"path""#;
+
+/// The light of a scene by some settings: mean of a pass and its standard error, from renders of so many seeds, of
+/// which no sample may have been refused.
+pub fn estimate(
+    s: &Stage,
+    (side, samples, seeds): (u32, u32, u32),
+    pass: Pass,
+    settings: &str,
+) -> (f64, f64) {
+    let one = |seed| {
+        let json = format!(r#","seed":{seed},"passes":["{}"]{settings}"#, pass.name());
+        let session = s.render(side, samples, &json);
+        assert_eq!(session.film().rejected_samples(), 0, "{settings}");
+        mean(&session, pass)
+    };
+    mean_and_error(&(0..seeds).map(one).collect::<Vec<_>>())
+}
+
+/// Asserts that two estimates agree within so many standard errors, but for `slack` (relative), and that they are
+/// precise enough to tell.
+pub fn assert_agree(what: &str, (a, sa): (f64, f64), (b, sb): (f64, f64), (errors, slack): (f64, f64)) {
+    let sigma = sa.hypot(sb);
+    let apart = 100.0 * (a / b - 1.0);
+    println!("{what}: {apart:.2} % apart, {:.2} % standard error", 100.0 * sigma / b);
+    assert!(
+        (a - b).abs() <= errors * sigma + slack * b.abs(),
+        "{what}: {a} +- {sa} against {b} +- {sb}, {apart:.2} % apart"
+    );
+    assert!(sigma < 0.025 * b.abs(), "{what}: too noisy to say anything, {sa} and {sb} of {b}");
 }
 
 /// Asserts that `got` is `expected` within a relative tolerance, saying what it is about.

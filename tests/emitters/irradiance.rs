@@ -470,3 +470,30 @@ fn many_lights_at_once() {
     paths.assert_agrees(next_event_over_disk(&e, &r, 0.2), 1e-4, "light paths of all");
     assert!(e.total_power().x > 0.0);
 }
+
+/// On a facet of a closed room whose walls glow to both sides, all directions shine, but for those of the facet itself:
+/// seen from its own plane it sends nothing, wherever rounding puts its points.
+#[test]
+fn a_wall_of_a_glowing_room_gets_no_light_from_itself() {
+    let radius = |k: usize| Vec3::new(3.0, 2.0, 2.5)[k];
+    let triangles: Vec<MeshTriangle> = (0..8u32)
+        .map(|octant| {
+            let corner = |k: usize| Vec3::AXES[k] * radius(k) * if octant >> k & 1 == 0 { 1.0 } else { -1.0 };
+            MeshTriangle {
+                instance: 0,
+                triangle: octant,
+                vertices: [0, 1, 2].map(corner),
+                radiance: Vec3::ONE,
+                two_sided: true,
+            }
+        })
+        .collect();
+    let e = emitters_of(&[], &triangles, &[]);
+    for (own, at) in [(0, [0.3, 0.3]), (3, [0.05, 0.1]), (5, [0.48, 0.5]), (6, [0.8, 0.15])] {
+        let [a, b, c] = triangles[own].vertices;
+        let x = a + (b - a) * at[0] + (c - a) * at[1];
+        let n = (b - a).cross(c - a).normalize();
+        let r = Receiver { position: x, normal: Some(if n.dot(x) > 0.0 { -n } else { n }) };
+        next_event(&e, &r).assert_is(PI, 1e-3, &format!("facet {own}"));
+    }
+}

@@ -121,7 +121,8 @@ def test_statistics(stage, tmp_path):
     ]
     for point in stats["curve"]:
         assert set(point) == {
-            "seconds", "cpu_seconds", "samples", "estimated_error", "mape", "relmse",
+            "seconds", "cpu_seconds", "samples", "estimated_error", "estimated_bias", "mape",
+            "relmse",
         }  # fmt: skip
 
 

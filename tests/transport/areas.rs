@@ -1,8 +1,8 @@
 //! Cluster areas. What matters of an estimate is what it does to the photons that are divided by it: the mean, over
 //! photons that fall uniformly, of the true area over the estimate, which is one for a perfect estimator.
 
-use crate::common::{Stage, icosphere};
-use crate::support::{ON, arrive, mean, sensor, world};
+use crate::common::{Stage, icosphere, mean_and_error};
+use crate::support::{ON, arrive, sensor, world};
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use segue::math::sampler::hash_unit;
 use segue::math::warp;
@@ -33,7 +33,7 @@ fn photons(world: &World, seed: u32, sides: &[Vec3], count: u32) -> Vec<Arrival>
 fn both_areas(world: &World, grid: &Grid, all: Numbered) -> [Vec<f32>; 2] {
     let mut clusters = Clusters::default();
     assert!(clusters.group(world, grid, all, &ON) && clusters.measure(world, grid, all, Areas::True, &ON));
-    let by_rays = clusters.of.iter().map(|&c| clusters.clusters[c as usize].area);
+    let by_rays = clusters.of.iter().map(|&c| 1.0 / clusters.clusters[c as usize].inverse_area);
     let first = |c: u32| all.get(clusters.order[clusters.clusters[c as usize].first as usize]);
     let by_plane = clusters.of.iter().map(|&c| {
         let representative = first(c);
@@ -81,22 +81,17 @@ fn of_octant(grid: &Grid, arrivals: &[Arrival], sides: &[Vec3]) -> Vec<Option<f6
     arrivals.iter().map(area).collect()
 }
 
-fn quad(s: &mut Stage, corners: [[f32; 3]; 4], material: u32) {
-    let mesh = s.mesh(&corners.map(Vec3::from), &[0, 1, 2, 0, 2, 3], None);
-    s.place(mesh, material, DMat4::IDENTITY);
-}
-
 #[test]
 fn areas_on_a_plane_at_an_edge_and_in_a_corner() {
     let mut s = Stage::default();
     let grey = s.material(GREY);
     let (floor, wall, other) = (Vec3::Z, Vec3::X, Vec3::Y);
-    quad(&mut s, [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]], grey);
+    s.quad([[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]], grey);
     let cases = [("plane", vec![floor]), ("edge", vec![floor, wall]), ("corner", vec![floor, wall, other])];
     for (name, sides) in cases {
         match name {
-            "edge" => quad(&mut s, [[0., 0., 0.], [0., 1., 0.], [0., 1., 1.], [0., 0., 1.]], grey),
-            "corner" => quad(&mut s, [[0., 0., 0.], [0., 0., 1.], [1., 0., 1.], [1., 0., 0.]], grey),
+            "edge" => s.quad([[0., 0., 0.], [0., 1., 0.], [0., 1., 1.], [0., 0., 1.]], grey),
+            "corner" => s.quad([[0., 0., 0.], [0., 0., 1.], [1., 0., 1.], [1., 0., 0.]], grey),
             _ => {}
         }
         let world = world(&mut s);
@@ -187,8 +182,8 @@ fn photons_on_spheres_are_as_dense_as_they_are() {
             })
         };
         let found: Vec<[f64; 2]> = (0..12).map(density).collect();
-        let (covered, sigma) = mean(&found.iter().map(|f| f[0]).collect::<Vec<_>>());
-        let (plane, _) = mean(&found.iter().map(|f| f[1]).collect::<Vec<_>>());
+        let (covered, sigma) = mean_and_error(&found.iter().map(|f| f[0]).collect::<Vec<_>>());
+        let (plane, _) = mean_and_error(&found.iter().map(|f| f[1]).collect::<Vec<_>>());
         println!(
             "sphere of {:.0} voxels: coverage {:+.2} % (+- {:.2}), plane cut {:+.2} %",
             radius / EDGE,

@@ -1,7 +1,7 @@
 //! The densities by which segments are weighed.
 
-use crate::common::Stage;
-use crate::support::{ON, follow, mean, ray, sensor, world};
+use crate::common::{Stage, mean_and_error};
+use crate::support::{ON, follow, ray, sensor, world};
 use glam::{DMat4, Vec3};
 use segue::math::{Sampler, warp};
 use segue::shading::bsdf::Walk;
@@ -92,7 +92,8 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
         let going = go_on(&mut a, &end, Walk::Light, &mut sampler);
         let (direction, pdf) = going.unwrap_or_default();
         let rivals = Rivals::First { light_density: 1.0, next_event_pdf: 0.0, is_delta: false };
-        let photon = Photon { flux: Vec3::ONE, bounces: 0, rivals, camera_choices: 1.0, direction, pdf };
+        let photon =
+            Photon { path: k, flux: Vec3::ONE, bounces: 0, rivals, camera_choices: 1.0, direction, pdf };
         light.arrivals.push(a);
         light.photons.push(photon);
         let next = going
@@ -139,7 +140,7 @@ fn segments_of_all_techniques_measure_the_etendue_between_two_plates() {
         for (footprint, paths) in [(0.2, 4000), (0.05, 20_000)] {
             let values: Vec<f64> =
                 (0..24).map(|seed| measured_etendue(&world, seed, paths, footprint)).collect();
-            let (m, sigma) = mean(&values);
+            let (m, sigma) = mean_and_error(&values);
             println!("{material}, voxels of {footprint}: {m:.5} +- {sigma:.5}, exact {exact:.5}");
             assert!(
                 (m - exact).abs() < 4.0 * sigma + 1e-3 * exact,
@@ -171,6 +172,7 @@ fn densities_integrate_to_the_number_of_paths_that_go_on() {
                 let rivals = Rivals::First { light_density: 1.0, next_event_pdf: 0.0, is_delta: false };
                 let flux = Vec3::ONE;
                 light.photons.push(Photon {
+                    path: k,
                     flux,
                     bounces: 0,
                     rivals,
@@ -198,7 +200,7 @@ fn densities_integrate_to_the_number_of_paths_that_go_on() {
             }
             integral / expected
         };
-        let (m, sigma) = mean(&(0..16).map(ratio).collect::<Vec<_>>());
+        let (m, sigma) = mean_and_error(&(0..16).map(ratio).collect::<Vec<_>>());
         println!("{material}: {m:.4} +- {sigma:.4}");
         // a glossy lobe loses what it draws below the surface
         let slack = if material == MATERIALS[0] { 0.0 } else { 0.03 };

@@ -3,6 +3,7 @@
 use crate::common::{Stage, assert_close, mean};
 use glam::{DMat4, DVec3, Vec3};
 use segue::film::Pass;
+use segue::transport::report::Report;
 
 /// A closed cube whose walls emit and reflect: everywhere `L = L_e / (1 - albedo)`.
 fn furnace(surface: &str) -> Stage {
@@ -23,35 +24,37 @@ const DIFFUSE: &str = r#"{"surface":{"type":"add","a":{"type":"diffuse","color":
 const GLOSSY: &str = r#"{"surface":{"type":"add","a":{"type":"mix","factor":0.5,"a":{"type":"diffuse","color":0},
     "b":{"type":"glossy","color":1,"roughness":0.6}},"b":{"type":"emission","strength":1}}}"#;
 
+/// Renders and tells of the graph.
+fn render(s: &Stage, side: u32, samples: u32, settings: &str) -> (f64, Report) {
+    let session = s.render(side, samples, settings);
+    let graph = session.statistics().graph.unwrap();
+    println!("{graph:?}");
+    (mean(&session, Pass::Combined), graph)
+}
+
 #[test]
 fn a_million_arrivals_share_a_few_clusters() {
     let s = furnace(DIFFUSE);
-    let session = s.render(1000, 1, r#","kernel":"fixed","kernel_size":1000,"light_paths":0"#);
-    let graph = session.statistics().graph.unwrap();
-    println!("{graph:?}");
+    let (mean, graph) = render(&s, 1000, 1, r#","kernel":"fixed","kernel_size":1000,"light_paths":0"#);
     assert!(graph.largest >= 1_000_000, "{graph:?}");
-    assert_close("a million", mean(&session, Pass::Combined), 2.0, 1.5e-3);
+    assert_close("a million", mean, 2.0, 1.5e-3);
 }
 
 #[test]
 fn every_arrival_is_a_cluster_of_its_own() {
     for surface in [DIFFUSE, GLOSSY] {
         let s = furnace(surface);
-        let session = s.render(128, 4, r#","kernel":"fixed","kernel_size":0.001"#);
-        let graph = session.statistics().graph.unwrap();
-        println!("{graph:?}");
+        let (mean, graph) = render(&s, 128, 4, r#","kernel":"fixed","kernel_size":0.001"#);
         let total: u64 = graph.sizes.iter().sum();
         assert!(graph.sizes[0] as f64 > 0.99 * total as f64, "{graph:?}");
-        assert_close(surface, mean(&session, Pass::Combined), 2.0, 0.01);
+        assert_close(surface, mean, 2.0, 0.01);
     }
 }
 
 #[test]
 fn large_clusters_of_glossy_lobes_are_divided() {
     let s = furnace(GLOSSY);
-    let session = s.render(256, 1, r#","kernel":"fixed","kernel_size":24,"light_paths":2"#);
-    let graph = session.statistics().graph.unwrap();
-    println!("{graph:?}");
+    let (mean, graph) = render(&s, 256, 1, r#","kernel":"fixed","kernel_size":24,"light_paths":2"#);
     assert!(graph.largest < 128, "{graph:?}");
-    assert_close("divided at random", mean(&session, Pass::Combined), 2.0, 0.01);
+    assert_close("divided at random", mean, 2.0, 0.01);
 }

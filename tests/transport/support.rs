@@ -44,11 +44,3 @@ pub fn arrive(world: &World, origin: Vec3, direction: Vec3) -> Option<Arrival> {
     let end = follow(world, ray(origin, direction), Walk::Light, &mut sampler).1?;
     Some(arrival(world, &end))
 }
-
-/// Mean and its standard error.
-pub fn mean(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let m = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0);
-    (m, (variance / n).sqrt())
-}

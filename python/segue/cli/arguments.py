@@ -48,15 +48,22 @@ def names(text: str) -> list[str]:
     return found
 
 
-def add_stage(parser: argparse.ArgumentParser) -> None:
-    """Adds the stage, the view of it, and what every method obeys."""
+def add_view(parser: argparse.ArgumentParser) -> None:
+    """Adds how a stage is seen, and what every method obeys."""
     add = parser.add_argument
-    add("stage", metavar="STAGE", type=Path, help="a .usd, .usda, .usdc or .usdz file")
     add("--resolution", type=size, metavar="WxH", help="default: the stage's, else 1280 wide")
     add("--camera", metavar="PRIM", help="path or name of a camera (default: the stage's)")
-    add("--frame", type=float, metavar="F", help="time code")
     add("--max-depth", type=int, metavar="N", help="bounces, -1 without limit (default)")
     add("--threads", type=int, default=0, metavar="N", help="default: all")
+    add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def add_stage(parser: argparse.ArgumentParser) -> None:
+    """Adds a stage at one time, and the view of it."""
+    add = parser.add_argument
+    add("stage", metavar="STAGE", type=Path, help="a .usd, .usda, .usdc or .usdz file")
+    add("--frame", type=float, metavar="F", help="time code")
+    add_view(parser)
 
 
 def load_stage(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:

@@ -82,7 +82,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="other renderers to compare with where their harness is installed: "
         f"{', '.join(peers.VARIANTS)}",
     )
-    add("--quiet", action="store_true", help="say nothing but errors")
     parser.set_defaults(run=run)
 
 

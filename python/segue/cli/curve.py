@@ -92,5 +92,6 @@ class Curve:
                 "cpu_seconds": time.process_time() - self._cpu_start - self.cpu_cost,
                 "samples": report.get("samples"),
                 "estimated_error": report.get("estimated_error"),
+                "estimated_bias": report.get("estimated_bias"),
             }
         )

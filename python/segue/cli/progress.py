@@ -7,6 +7,8 @@ import time
 from types import TracebackType
 from typing import Any
 
+from ..reporting import error_text
+
 #: Seconds between two lines where there is no terminal.
 INTERVAL = 10.0
 
@@ -18,11 +20,6 @@ def clock(seconds: float | None) -> str:
     whole = round(seconds)
     hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
-
-
-def error_text(error: float | None) -> str:
-    """An estimated error for people."""
-    return "error -" if error is None or not error > 0 else f"error {error:.2g}"
 
 
 class Progress:
@@ -77,7 +74,7 @@ class Progress:
         fraction = float(report.get("fraction") or 0.0)
         state = (
             f"{report.get('samples') or 0:g} samples  {clock(report.get('seconds'))} elapsed  "
-            f"{clock(report.get('remaining'))} left  {error_text(report.get('estimated_error'))}"
+            f"{clock(report.get('remaining'))} left  {error_text(report)}"
         )
         stage = report.get("stage")
         if stage and not report.get("samples"):

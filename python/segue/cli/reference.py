@@ -54,7 +54,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="N",
         help="first seed; far from those of what is compared with it (default: %(default)s)",
     )
-    add("--quiet", action="store_true", help="say nothing but errors")
     parser.set_defaults(run=run)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from .. import images
 from ..render import Render
+from ..reporting import error_text
 from ..scene import Scene
 from ..tonemapping import TONEMAPPING
 from . import arguments, output
@@ -80,25 +81,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="E",
         help="stop at this estimated relative mean squared error",
     )
-    add(
-        "--resolution",
-        type=arguments.size,
-        metavar="WxH",
-        help="default: the stage's, else 1280 wide",
-    )
-    add("--camera", metavar="PRIM", help="path or name of a camera (default: the stage's)")
+    arguments.add_view(parser)
     frames = parser.add_mutually_exclusive_group()
     frames.add_argument("--frame", type=float, metavar="F", help="time code")
     frames.add_argument(
         "--frames", type=arguments.frames, metavar="A:B", help="every frame from A to B"
     )
-    add("--max-depth", type=int, metavar="N", help="bounces, -1 without limit (default)")
-    add("--threads", type=int, default=0, metavar="N", help="default: all")
     add("--seed", type=int, default=0, metavar="N", help="default: 0")
     add("--passes", metavar="a,b,...", help="passes in the EXR beside Combined")
     add("--reference", metavar="REF.exr", help="measure the error against this picture")
     add("--stats", type=Path, metavar="STATS.json", help="write statistics")
-    add("--quiet", action="store_true", help="say nothing but errors")
     parser.set_defaults(run=run)
 
 
@@ -220,7 +212,8 @@ def _render_frame(
 def _summary(stats: dict[str, Any], written: list[Path]) -> str:
     parts = [
         f"{', '.join(str(p) for p in written)}: {stats['samples']:g} samples",
-        f"{clock(stats['seconds'])} rendering, {clock(stats['loading_seconds'])} loading",
+        f"{error_text(stats)} after {clock(stats['seconds'])}",
+        f"{clock(stats['loading_seconds'])} loading",
     ]
     if stats.get("non_finite"):
         parts.append(f"{stats['non_finite']} non-finite samples were dropped")

@@ -33,14 +33,10 @@ use crate::transport::kernel::Kernel;
 use camera::CameraSampler;
 use light::LightStore;
 use merge::PhotonMap;
-use rayon::prelude::*;
 use splat::SplatBuffer;
 use std::f32::consts::PI;
-use std::sync::atomic::Ordering::Relaxed;
 use vertex::Rules;
 
-/// Light paths that one task samples.
-const LIGHT_BATCH: u32 = 1024;
 /// Keeps the random numbers of light paths apart from those of pixels.
 const LIGHT_STREAM: u32 = 0x7e27_1c00;
 
@@ -160,22 +156,11 @@ impl Vertices {
     fn trace_light(&mut self, context: &Context, rules: &Rules, index: u32) {
         let paths = rules.light_paths as u32;
         let wanted = |film| splat::is_wanted(film, context.filter, context.crop);
-        let batches: Vec<LightStore> = (0..paths.div_ceil(LIGHT_BATCH))
-            .into_par_iter()
-            .map(|b| {
-                let (mut store, mut rays) = (LightStore::default(), 0);
-                for k in b * LIGHT_BATCH..paths.min((b + 1) * LIGHT_BATCH) {
-                    if context.stop.is_raised() {
-                        break;
-                    }
-                    // the paths of one iteration are stratified among each other
-                    let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k);
-                    light::path(rules, &mut random, &wanted, &mut store, &mut rays);
-                }
-                context.counters.rays.fetch_add(rays, Relaxed);
-                store
-            })
-            .collect();
+        let batches = context.light_batches(paths, |k, store, rays| {
+            // the paths of one iteration are stratified among each other
+            let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k);
+            light::path(rules, &mut random, &wanted, store, rays);
+        });
         self.light.clear();
         batches.into_iter().for_each(|mut store| self.light.append(&mut store));
     }
@@ -189,21 +174,12 @@ impl Vertices {
         };
         let crop = context.crop;
         let (pixels, paths) = (crop.area() as u64, self.light.path_ends.len() as u64);
-        let rows = (0..crop.height).into_par_iter().map(|y| {
-            let (mut samples, mut rays) = (Vec::with_capacity(crop.width as usize), 0);
-            for x in 0..crop.width {
-                if context.stop.is_raised() {
-                    break;
-                }
-                let (ray, mut random) = context.camera_sample(x, y, index);
-                let pixel = u64::from(y) * u64::from(crop.width) + u64::from(x);
-                let mate = (pixel * paths / pixels) as usize;
-                samples.push(sampler.path(&ray, &mut random, mate, &mut rays));
-            }
-            context.counters.rays.fetch_add(rays, Relaxed);
-            samples
+        let rows = context.camera_rows(|x, y, samples: &mut Vec<Sample>, rays| {
+            let (ray, mut random) = context.camera_sample(x, y, index);
+            let pixel = u64::from(y) * u64::from(crop.width) + u64::from(x);
+            let mate = (pixel * paths / pixels) as usize;
+            samples.push(sampler.path(&ray, &mut random, mate, rays));
         });
-        let rows: Vec<Vec<Sample>> = rows.collect();
         self.samples.clear();
         rows.into_iter().for_each(|mut row| self.samples.append(&mut row));
     }

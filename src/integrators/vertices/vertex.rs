@@ -2,10 +2,10 @@
 
 use super::mis::{Sum, Turn};
 use crate::shading::bsdf::{Bsdf, Walk};
-use crate::shading::{Sensor, SurfaceClass, SurfacePoint, World};
+use crate::shading::{Address, Sensor, SurfaceClass, SurfacePoint, World};
 use crate::transport::arrival::survival;
 use crate::transport::walk::End;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use std::borrow::Cow;
 
 /// Largest share of the distance to the camera that the radius of merging may be.
@@ -138,12 +138,8 @@ pub struct LightVertex {
     pub normal: Vec3,
     /// Unit direction to the vertex before.
     pub wo: Vec3,
-    /// Instance, triangle and barycentrics of the surface.
-    pub instance: u32,
-    /// See `instance`.
-    pub triangle: u32,
-    /// See `instance`.
-    pub barycentrics: Vec2,
+    /// The surface.
+    pub at: Address,
     /// Absolute cosine of `wo` to the geometric normal.
     pub cos: f32,
     /// Flux that arrives, were it the only light path, W.
@@ -161,7 +157,7 @@ pub struct LightVertex {
 impl LightVertex {
     /// Ready to be left.
     pub fn with<T>(&self, world: &World, f: impl FnOnce(&Vertex) -> T) -> T {
-        let hit = world.surface(self.instance, self.triangle, self.barycentrics);
+        let hit = world.surface(&self.at);
         let bsdf = world.bsdf(&hit, self.wo);
         f(&Vertex { hit: &hit, bsdf: &bsdf, wo: self.wo, survival: self.survival, sum: self.sum })
     }

@@ -35,6 +35,9 @@ pub(super) struct Triangle {
 
 /// Solid angle from which on points are chosen by it.
 const NEAR: f64 = 0.05;
+/// Height of a receiver over the triangle's plane, over its coordinates, below which rounding blurs the directions
+/// to points nearby: seen from the triangle itself, all of them are.
+const BLURRED: f64 = 1e-5;
 
 impl Triangle {
     /// `None` where it cannot emit: no area, no radiance, or not finite.
@@ -55,6 +58,11 @@ impl Triangle {
         let size2 = a.length_squared().max(b.length_squared()).max((a - b).length_squared());
         let middle = self.vertex + (a + b) / 3.0;
         if middle.distance_squared(x) > 4.0 * size2 {
+            return None;
+        }
+        let reach = x.abs().max(self.vertex.abs()).max_element().max(size2.sqrt());
+        let (o, normal) = (x.as_dvec3() - self.vertex.as_dvec3(), a.as_dvec3().cross(b.as_dvec3()));
+        if o.dot(normal).abs() <= BLURRED * f64::from(reach) * normal.length() {
             return None;
         }
         let corner = |at: Vec3| at.as_dvec3() - x.as_dvec3();

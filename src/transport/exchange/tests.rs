@@ -87,8 +87,15 @@ fn both_ways(world: &World, count: u32) -> (CameraStore, LightStore) {
         push(b, Outgoing::default());
         let rivals = Rivals::First { light_density: 1.0, next_event_pdf: 0.0, is_delta: false };
         let pdf = next.vertex.bsdf.continuous_pdf(b.wo, b.wo).0;
-        let photon =
-            Photon { flux: Vec3::ONE, bounces: 0, rivals, camera_choices: 1.0, direction: b.wo, pdf };
+        let photon = Photon {
+            path: k,
+            flux: Vec3::ONE,
+            bounces: 0,
+            rivals,
+            camera_choices: 1.0,
+            direction: b.wo,
+            pdf,
+        };
         light.arrivals.push(Arrival { goes_on: true, ..b });
         light.photons.push(photon);
         light.arrivals.push(Arrival { wo: sample.direction, goes_on: false, ..a });
@@ -126,10 +133,15 @@ fn the_weights_of_all_techniques_sum_to_one() {
             if clusters.of[n + i + 1] != clusters.of[i] || clusters.of[n + i] != clusters.of[i + 1] {
                 continue;
             }
-            let own = camera.arrivals[i + 1].survival * light.photons[i].pdf;
+            let returns = clusters.of[n + i + 1] == clusters.of[n + i];
+            if returns && end.class != SurfaceClass::Diffuse {
+                continue;
+            }
+            let twin = if returns { light.arrivals[i + 1].survival } else { 0.0 };
+            let own = (light.arrivals[i].survival + twin) * light.photons[i].pdf;
             let segment = &constants[i];
             let p_light = weights.densities[clusters.place[i + 1] as usize].light;
-            // the light path itself is left out both ways
+            // the light path itself is left out both ways, all of it
             let camera_weight = segment.camera / (segment.camera + segment.light * (p_light - own).max(0.0));
             let light_weight = photon_value(s, &weights, i + 1).x / start.inverse_area;
             let sum = camera_weight + light_weight;
