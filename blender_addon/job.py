@@ -167,7 +167,8 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
         monitor = _Monitor(engine, frame, render, view, (index, len(views)), segue.error_text)
         finished = render.run(progress=monitor.progress, tile=monitor.tile)
         frame.write(_read_passes(render, frame), view=view)
-        _finish(engine, frame, render.stats(), segue.error_text)
+        stats = render.stats()
+        _finish(engine, frame, stats, segue.error_text(stats))
         if not finished:
             return
 
@@ -186,19 +187,14 @@ def _report(engine: SegueRenderEngine, log: ExportLog, info: dict[str, Any]) -> 
             engine.report({"WARNING"}, f"Segue: {message}")
 
 
-def _finish(
-    engine: SegueRenderEngine,
-    frame: Frame,
-    stats: dict[str, Any],
-    error_text: Callable[[dict[str, Any]], str],
-) -> None:
+def _finish(engine: SegueRenderEngine, frame: Frame, stats: dict[str, Any], error: str) -> None:
     """Leave the final figures in the status line and speak of pixels that went wrong."""
     mebibytes = stats.get("peak_memory_bytes", 0) / 2**20
     engine.update_memory_stats(memory_used=mebibytes, memory_peak=mebibytes)
     minutes, seconds = divmod(round(stats.get("seconds", 0.0)), 60)
     engine.update_stats(
         frame.layer,
-        f"{stats.get('samples', 0):.0f} samples, {error_text(stats)} after {minutes}:{seconds:02d}",
+        f"{stats.get('samples', 0):.0f} samples, {error} after {minutes}:{seconds:02d}",
     )
     if stats.get("non_finite"):
         engine.report(

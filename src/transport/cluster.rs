@@ -261,13 +261,9 @@ fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut C
     let estimate = |points: u32| {
         exact.unwrap_or_else(|| cell.coverage(world, points, &|p, n| hub.is_hidden(world, p, n))) / parts
     };
-    if areas == Areas::True {
-        c.area = estimate(MOST_POINTS);
-        c.inverse_area = 1.0 / estimate(MANY_POINTS);
-        return;
-    }
-    c.area = estimate(FEW_POINTS);
-    if c.cameras > 0 && c.lights > 0 {
+    let is_true = areas == Areas::True;
+    c.area = estimate(if is_true { MOST_POINTS } else { FEW_POINTS });
+    if is_true || (c.cameras > 0 && c.lights > 0) {
         c.inverse_area = 1.0 / estimate(MANY_POINTS);
     }
 }

@@ -151,10 +151,8 @@ pub(super) fn gather_photons(
         if c.cameras == 0 || c.lights == 0 {
             return (Vec3::ZERO, 0.0);
         }
-        let mut own: Vec<f32> = s.lights(c).map(|j| s.light.arrivals[j].survival).collect();
-        s.sum_over_paths(c, &mut own);
         let (mut arriving, mut left_out) = (DVec3::ZERO, 0.0);
-        for (j, own) in s.lights(c).zip(own) {
+        for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
             let value = (light(j) * s.light.arrivals[j].back_pdf).as_dvec3();
             arriving += value;
             left_out += value.element_sum() * f64::from(own);

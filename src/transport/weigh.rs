@@ -87,13 +87,20 @@ impl<'a> Sampled<'a> {
 
     /// Path of light arrival `j`.
     #[inline]
-    pub fn path(&self, j: usize) -> u32 {
+    fn path(&self, j: usize) -> u32 {
         self.light.photons[j].path
+    }
+
+    /// For every light arrival of the cluster, in their order: the sum of `q` over those of its path there.
+    pub fn path_survivals(&self, c: &Cluster) -> Vec<f32> {
+        let mut q: Vec<f32> = self.lights(c).map(|j| self.light.arrivals[j].survival).collect();
+        self.sum_over_paths(c, &mut q);
+        q
     }
 
     /// Replaces the value of every light arrival of the cluster, in their order, by the sum of those of its path: what
     /// is left out with it. A path that returns to a cluster is no more independent of itself than a photon is.
-    pub fn sum_over_paths(&self, c: &Cluster, values: &mut [f32]) {
+    fn sum_over_paths(&self, c: &Cluster, values: &mut [f32]) {
         // arrivals are in the order of their numbers, so those of a path follow each other
         let mut paths = self.lights(c).map(|j| self.path(j)).peekable();
         let mut start = 0;
@@ -223,9 +230,7 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             .push(Density { camera: q_camera * s.camera.outgoing[i].pdf, light: q_light * a.back_pdf });
         batch.direct.push(a.reflectance * arriving);
     }
-    let mut own: Vec<f32> = s.lights(c).map(|j| s.light.arrivals[j].survival).collect();
-    s.sum_over_paths(c, &mut own);
-    for (j, own) in s.lights(c).zip(own) {
+    for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
         let a = &s.light.arrivals[j];
         let q = if estimator == Estimator::Literal { q_light } else { (q_light - own).max(0.0) };
         batch.densities.push(Density { camera: q_camera * a.back_pdf, light: q * s.light.photons[j].pdf });
