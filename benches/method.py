@@ -1,9 +1,9 @@
 """The figures of docs/method.md: gain over path tracing at equal processor time, and the mean against the kernel's size.
 
 Needs the scenes and references that are shared between renderers (SEGUE_SHARED, or ../shared beside the
-checkout); without them it says so and does nothing. `pictures` needs none of it, but what
+checkout); without them it says so and does nothing. `gallery` needs none of it, nor does `pictures`, but what
 `cargo test --release --test method_pictures -- --ignored` draws. Run:
-.venv/bin/python benches/method.py table|consistency|plot|pictures
+.venv/bin/python benches/method.py table|consistency|gallery|plot|pictures
 """
 
 from __future__ import annotations
@@ -20,6 +20,16 @@ from segue import Render, images, metrics, usd
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers"
 SCENES = ("cornell", "cornell_glass", "ajar_door", "glossy_box", "lamp", "furnace")
+#: Scenes of the gallery, and an unbiased method (or one whose bias is least) that finds their light.
+GALLERY = {
+    "door_ajar": "bdpt",
+    "glass_caustic": "vcm",
+    "glossy_room": "bdpt",
+    "lamp": "vcm",
+    "night_market": "path",
+    "pool": "vcm",
+    "still_life": "path",
+}
 PICTURES = ROOT / "docs" / "pictures"
 #: Relative noise of the references' means, as far as other renderers tell.
 KNOWN_TO = {"ajar_door": 0.006, "lamp": 0.006}
@@ -98,6 +108,29 @@ def consistency(seeds: int = 4, samples: int = 12) -> None:
                 print(json.dumps(row), flush=True)
 
 
+def gallery(seeds: int = 6, seconds: float = 10.0) -> None:
+    """Means of the gallery's scenes by size of a fixed kernel, beside an unbiased method, as JSON lines.
+
+    One thread each; the methods take turns, so that none is alone with a busy machine.
+    """
+    for name, unbiased in GALLERY.items():
+        scene = usd.load(ROOT / "scenes" / f"{name}.usda").scene
+        kernels = {f"segment {s:g} px": {"kernel_size": s} for s in SIZES}
+        runs: dict[str, dict[str, Any]] = {unbiased: {"integrator": unbiased}}
+        runs |= {k: {"kernel": "fixed"} | v for k, v in kernels.items()}
+        means: dict[str, list[float]] = {what: [] for what in runs}
+        for seed in range(seeds):
+            for what, settings in runs.items():
+                size = {"resolution": [128, 72], "time": seconds, "threads": 1}
+                picture, _ = render(scene, seed=1000 * seed, **size, **settings)
+                means[what].append(float(picture.mean()))
+        for what, found in means.items():
+            ratio = np.mean(found) / np.mean(means[unbiased])
+            spread = np.std(found, ddof=1) / seeds**0.5 / np.mean(found)
+            row = {"scene": name, "method": what, "mean": ratio, "error": spread}
+            print(json.dumps(row), flush=True)
+
+
 def plot() -> None:
     """The output of `consistency`, from the standard input, as a picture."""
     from matplotlib import pyplot
@@ -173,6 +206,5 @@ if __name__ == "__main__":
     if command in ("table", "consistency") and not (SHARED / "refs").is_dir():
         sys.exit(f"skipped: {SHARED} does not exist")
     PICTURES.mkdir(exist_ok=True)
-    {"table": table, "consistency": consistency, "plot": plot, "pictures": pictures}[
-        command
-    ]()
+    commands = (table, consistency, gallery, plot, pictures)
+    {f.__name__: f for f in commands}[command]()
