@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import engine, library, panels, properties
+from . import engine, history, library, panels, preferences, properties
 
-MODULES = (properties, engine, panels)
+MODULES = (preferences, properties, history, engine, panels)
 
 
 def register() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 import numpy as np
 
-from . import library, passes
+from . import history, library, passes
 from .export.camera import export_camera
 from .export.depsgraph import Exporter
 from .export.settings import film_size, render_settings
@@ -168,7 +168,13 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
         finished = render.run(progress=monitor.progress, tile=monitor.tile)
         frame.write(_read_passes(render, frame), view=view)
         stats = render.stats()
-        _finish(engine, frame, stats, segue.error_text(stats))
+        error = segue.error_text(stats)
+        _finish(engine, frame, stats, error)
+        if not engine.is_preview:
+            points = stats.get("curve", [])
+            text = error.capitalize()
+            run = history.Run(frame.layer, view, points, text, engine.is_animation, finished)
+            history.keep(depsgraph.scene, run)
         if not finished:
             return
 

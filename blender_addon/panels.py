@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import bpy
 
+from . import history
 from .engine import SegueRenderEngine
 
 ENGINE = SegueRenderEngine.bl_idname
@@ -80,6 +81,31 @@ class SEGUE_RENDER_PT_film(_Panel):
         column.prop(settings, "filter_width", text="Width")
 
 
+class SEGUE_RENDER_PT_error(_Panel):
+    """How the error of the last render fell."""
+
+    bl_label = "Error"
+    bl_context = "render"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender whenever the panel is shown."""
+        layout = self.layout
+        shown = history.shown(context.scene)
+        if shown is None:
+            layout.label(text="Render to see how the error falls")
+            return
+        layout.template_icon(icon_value=shown.icon, scale=_icon_scale(context))
+        layout.label(text=shown.text)
+
+
+def _icon_scale(context: bpy.types.Context) -> float:
+    """Scale at which an icon fills the width of a panel but for its margins."""
+    # Blender has no scale before its first window.
+    unit = 20.0 * (context.preferences.system.ui_scale or 1.0)
+    return min(max(context.region.width / unit - 3.0, 6.0), 30.0)
+
+
 class SEGUE_VIEWLAYER_PT_passes(_Panel):
     """Which passes a view layer has."""
 
@@ -102,7 +128,12 @@ class SEGUE_VIEWLAYER_PT_passes(_Panel):
         column.prop(view_layer.segue, "use_pass_indirect")
 
 
-CLASSES = (SEGUE_RENDER_PT_sampling, SEGUE_RENDER_PT_film, SEGUE_VIEWLAYER_PT_passes)
+CLASSES = (
+    SEGUE_RENDER_PT_sampling,
+    SEGUE_RENDER_PT_film,
+    SEGUE_RENDER_PT_error,
+    SEGUE_VIEWLAYER_PT_passes,
+)
 
 
 def _shared_panels() -> list[type[bpy.types.Panel]]:

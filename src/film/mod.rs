@@ -18,6 +18,7 @@ mod openexr;
 mod pass;
 mod rect;
 mod sample;
+mod splat;
 mod tile;
 
 pub use buffer::{Film, SharedTile, TILE_SIZE};
@@ -28,4 +29,5 @@ pub use openexr::{Compression, ExrOptions};
 pub use pass::{Pass, PassSet};
 pub use rect::Rect;
 pub use sample::{FirstHit, Sample};
+pub use splat::{Splat, SplatBuffer, Splatted, is_wanted};
 pub use tile::{BACKGROUND_DEPTH, Tile};

@@ -1,9 +1,10 @@
 //! Segment-based light transport: the whole method, iteration by iteration.
 
 use super::{Context, Integrator, IterationEnd, StageCosts};
-use crate::film::{Pass, Sample};
+use crate::film::{Pass, Sample, SplatBuffer};
 use crate::math::Sampler;
 use crate::math::sampler::hash;
+use crate::transport::bridge::{BridgeSampler, Bridges};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
@@ -25,6 +26,19 @@ const IDLE: f32 = 1.0 / 16.0;
 const LIGHT_STREAM: u32 = 0x11e4_7000;
 /// Keeps those of the grids apart from both.
 const GRID_STREAM: u32 = 0x961d_0000;
+/// Keeps those of bridges apart.
+const BRIDGE_STREAM: u32 = 0xb21d_9e00;
+
+/// For every camera arrival, [`Primary::density`] if it is seen straight.
+fn seen_straight(primaries: &[Primary], s: Sampled) -> Vec<f32> {
+    let mut seen = vec![0.0; s.camera.arrivals.len()];
+    for p in primaries.iter().filter(|p| p.passages == 0) {
+        if let Some(a) = p.arrival {
+            seen[a as usize] = p.density;
+        }
+    }
+    seen
+}
 
 /// Segment-based light transport. Its stores are kept from one iteration to the next.
 #[derive(Debug, Default)]
@@ -33,6 +47,8 @@ pub struct Segment {
     camera: CameraStore,
     light: LightStore,
     clusters: Clusters,
+    bridges: Bridges,
+    splats: SplatBuffer,
     weights: Weights,
     reflected: Reflected,
     /// What every pixel sees, row by row.
@@ -102,7 +118,33 @@ impl Segment {
         costs.stage("areas", 0);
         context.counters.segments.store(self.segments() as u64, Relaxed);
 
-        let sampled = Sampled { world, camera: &self.camera, light: &self.light, clusters: &self.clusters };
+        let joined = Sampled {
+            world,
+            camera: &self.camera,
+            light: &self.light,
+            clusters: &self.clusters,
+            bridges: None,
+        };
+        let bridges = match self.techniques.bridges {
+            Some(choice) => {
+                let seed = context.seed ^ BRIDGE_STREAM;
+                let Context { sensor, filter, crop, max_depth, .. } = *context;
+                let sampler =
+                    BridgeSampler { sampled: joined, sensor, choice, seed, index, filter, crop, max_depth };
+                let mut rays = 0;
+                let is_done =
+                    self.bridges.sample(&sampler, seen_straight(&self.primaries, joined), &mut rays, cut);
+                context.counters.rays.fetch_add(rays, Relaxed);
+                if !is_done {
+                    return false;
+                }
+                self.splats.collect(&self.bridges.splats, filter, crop);
+                costs.stage("bridges", self.bridges.bytes() + self.splats.bytes());
+                Some(&self.bridges)
+            }
+            None => None,
+        };
+        let sampled = Sampled { bridges, ..joined };
         if !self.weights.weigh(sampled, self.techniques.estimator, cut) {
             return false;
         }
@@ -193,24 +235,29 @@ impl Segment {
     /// One sample for every pixel.
     fn gather(&self, context: &Context) {
         let width = context.crop.width as usize;
+        let sampled = Sampled {
+            world: context.world,
+            camera: &self.camera,
+            light: &self.light,
+            clusters: &self.clusters,
+            bridges: self.techniques.bridges.map(|_| &self.bridges),
+        };
         context.film.add_iteration(|x, y| {
-            let p = &self.primaries[y as usize * width + x as usize];
+            let pixel = y as usize * width + x as usize;
+            let (p, splatted) = (&self.primaries[pixel], self.splats.get(pixel));
             let (reflected, direct) = match p.arrival.map(|a| a as usize) {
                 Some(a) => {
                     let direct = self.reflected.direct.get(a).filter(|_| p.passages == 0);
-                    (
-                        self.reflected.carried[a] + self.reflected.photons[a].reflected,
-                        direct.copied().unwrap_or(Vec3::ZERO),
-                    )
+                    (self.reflected.towards_camera(sampled, a), direct.copied().unwrap_or(Vec3::ZERO))
                 }
                 None => (Vec3::ZERO, Vec3::ZERO),
             };
             Sample {
-                radiance: p.light + p.weight * reflected,
+                radiance: p.light + p.weight * reflected + splatted.light,
                 unfiltered: self.techniques.camera_paths.then(|| p.light + p.weight * p.unfiltered),
                 alpha: p.alpha,
                 emission: p.emission,
-                direct: p.mirrored + p.weight * direct.min(reflected),
+                direct: p.mirrored + p.weight * direct.min(reflected) + splatted.direct,
                 first_hit: p.first_hit,
             }
         });

@@ -174,7 +174,7 @@ impl Session {
         let Techniques { kernel, light_paths, .. } = techniques;
         let mut integrator: Box<dyn Integrator> = match self.settings.method {
             Method::Path => Box::new(Path),
-            Method::Segment => Box::new(Segment::new(techniques)),
+            Method::Segment | Method::SegmentBridge => Box::new(Segment::new(techniques)),
             Method::Mvf => Box::new(Segment::new(Techniques { light_paths: 0.0, ..techniques })),
             Method::PhotonFilter => Box::new(Segment::new(Techniques { camera_paths: false, ..techniques })),
             Method::Light => Box::new(Vertices::light_tracing(light_paths)),

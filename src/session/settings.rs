@@ -1,6 +1,7 @@
 //! What is asked of a render.
 
 use crate::film::{Filter, FilterKind, Pass, PassSet, Rect};
+use crate::transport::bridge::Choice;
 use crate::transport::kernel::{DEFAULT_ALPHA, Kernel, Shrinking};
 use crate::transport::{Estimator, Techniques};
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,8 @@ pub enum Method {
     /// Segment-based light transport.
     #[default]
     Segment,
+    /// The same with bridge segments.
+    SegmentBridge,
     /// Its camera segments alone: multi-vertex filtering.
     Mvf,
     /// Its light segments, gathered where camera paths first arrive.
@@ -52,6 +55,15 @@ enum EstimatorName {
     #[default]
     LeaveOneOut,
     Literal,
+}
+
+/// How bridge segments choose the light segments that they join.
+#[derive(Clone, Copy, Debug, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+enum BridgeName {
+    #[default]
+    Uniform,
+    Power,
 }
 
 /// Validated settings of a render.
@@ -101,6 +113,7 @@ pub struct Limits {
 struct Json {
     integrator: Method,
     estimator: EstimatorName,
+    bridges: BridgeName,
     kernel: KernelName,
     kernel_size: f32,
     kernel_alpha: f32,
@@ -128,6 +141,7 @@ impl Default for Json {
         Self {
             integrator: Method::default(),
             estimator: EstimatorName::default(),
+            bridges: BridgeName::default(),
             kernel: KernelName::default(),
             kernel_size: techniques.kernel.start,
             kernel_alpha: DEFAULT_ALPHA,
@@ -160,6 +174,10 @@ impl Json {
         if self.light_paths == 0.0 && self.integrator.needs_light_paths() {
             return Err("settings: light_paths is 0, and this integrator cannot do without".into());
         }
+        let has_bridges = self.integrator == Method::SegmentBridge;
+        if has_bridges && matches!(self.estimator, EstimatorName::Literal) {
+            return Err("settings: the literal recursion has no bridges".into());
+        }
         let alpha = within("kernel_alpha", self.kernel_alpha, 0.01, 0.99)?;
         let techniques = Techniques {
             estimator: match self.estimator {
@@ -176,6 +194,10 @@ impl Json {
             light_paths: within("light_paths", self.light_paths, 0.0, 64.0)?,
             next_event: self.next_event,
             camera_paths: self.camera_paths,
+            bridges: has_bridges.then_some(match self.bridges {
+                BridgeName::Uniform => Choice::Uniform,
+                BridgeName::Power => Choice::ByPower,
+            }),
         };
         if techniques.light_paths == 0.0 && !techniques.next_event && !techniques.camera_paths {
             return Err(

@@ -260,6 +260,24 @@ impl World {
         Shaded::Scatters { weight, opacity, vertex: Vertex { bsdf: self.materials.bsdf(p, wo), emission } }
     }
 
+    /// Probability that a segment which arrives at a surface from `from` ends there. `bsdf`: of that surface, seen from
+    /// anywhere.
+    pub fn end_probability(&self, p: &SurfacePoint, bsdf: &Bsdf, from: Vec3) -> f32 {
+        match bsdf.has_delta() {
+            // layers hide each other by the direction they are seen from
+            true => self.bsdf(p, from).end_probability(from),
+            false => 1.0,
+        }
+    }
+
+    /// Share of the surface that is there.
+    pub fn opacity(&self, p: &SurfacePoint) -> f32 {
+        match self.needs.transparency && self.materials.may_be_transparent(p.material) {
+            true => self.materials.opacity(p.material, &p.at),
+            false => 1.0,
+        }
+    }
+
     fn emission_towards(&self, p: &SurfacePoint, wo: Vec3) -> Vec3 {
         if !self.needs.emissive_surfaces {
             return Vec3::ZERO;

@@ -23,6 +23,8 @@ pub struct Primary {
     pub weight: Vec3,
     /// Dirac lobes that it passes.
     pub passages: u32,
+    /// Density per area with which primary segments arrive there, times `c`.
+    pub density: f32,
     /// Basic radiance that the path by itself finds to be reflected there.
     pub unfiltered: Vec3,
     /// Radiance of the lights on it.
@@ -42,6 +44,7 @@ impl Primary {
         arrival: None,
         weight: Vec3::ZERO,
         passages: 0,
+        density: 0.0,
         unfiltered: Vec3::ZERO,
         light: Vec3::ZERO,
         emission: Vec3::ZERO,
@@ -186,6 +189,9 @@ impl CameraSampler<'_> {
         primary.arrival = Some(first as u32);
         primary.weight = chain.throughput / chain.forward;
         primary.passages = chain.passages;
+        let place = &end.hit.place;
+        primary.density =
+            chain.forward * place.normal.dot(end.wo).abs() * self.sensor.density(ray, place.position);
         let mut inverse_n2 = 1.0 / (chain.index * chain.index);
         let mut own = OwnPath::new(chain.passages, self.max_depth);
         let follow = Follow { from_camera: false, ..follow };

@@ -6,9 +6,8 @@
 //! with `m` of them reads what its end reflected `m` sweeps before.
 
 use super::Cut;
-use super::exchange::{
-    FromPhotons, emitted, gather, gather_photons, has_end, per_index, photon_values, segments,
-};
+use super::exchange::{emitted, gather, has_end, per_index, segments};
+use super::photons::{FromPhotons, gather_photons, photon_values, towards_camera};
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use glam::Vec3;
@@ -80,11 +79,13 @@ impl Reflected {
                 let level = levels.back(s.camera.outgoing[i].passages).filter(|_| has_end(s, i));
                 self.segments[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1].brought)))
             });
-            let photons = gather_photons(s, w, &self.segments, &values, cut, |p| p.bounces < k);
+            let photons = gather_photons(s, w, &self.segments, &values, cut, |bounces| bounces < k);
             let carried = gather(s, w, &brought, cut);
             if k == 1 {
                 self.direct.clone_from(&carried);
-                self.direct.par_iter_mut().zip(&photons).for_each(|(d, p)| *d += p.reflected);
+                let seen =
+                    |(i, (d, p)): (usize, (&mut Vec3, &FromPhotons))| *d = towards_camera(s, i, *d, *p);
+                self.direct.par_iter_mut().zip(&photons).enumerate().for_each(seen);
             }
             levels.push(Level { carried, photons });
         }

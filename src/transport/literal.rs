@@ -7,9 +7,8 @@
 
 use super::Cut;
 use super::depth::{Levels, longest_chain};
-use super::exchange::{
-    FromPhotons, GRAIN, Segment, emitted, has_end, per_diffuse_cluster, photon_value, reciprocal, segments,
-};
+use super::exchange::{GRAIN, Segment, emitted, has_end, per_diffuse_cluster, reciprocal, segments};
+use super::photons::{FromPhotons, photon_value};
 use super::propagate::Reflected;
 use super::store::Rivals;
 use super::weigh::{Sampled, Weights};

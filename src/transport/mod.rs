@@ -3,6 +3,7 @@
 
 pub mod area;
 pub mod arrival;
+pub mod bridge;
 pub mod camera;
 pub mod cluster;
 pub mod depth;
@@ -12,6 +13,7 @@ pub mod kernel;
 pub mod light;
 mod literal;
 mod own_path;
+mod photons;
 pub mod propagate;
 pub mod report;
 pub mod store;
@@ -53,6 +55,8 @@ pub struct Techniques {
     pub next_event: bool,
     /// Whether camera paths go on after their first arrival.
     pub camera_paths: bool,
+    /// Bridge segments, if any, by how their light arrivals are chosen.
+    pub bridges: Option<bridge::Choice>,
 }
 
 impl Techniques {
@@ -70,6 +74,7 @@ impl Default for Techniques {
             light_paths: 1.0,
             next_event: true,
             camera_paths: true,
+            bridges: None,
         }
     }
 }

@@ -6,9 +6,8 @@
 //! the other photons there alone, since that one's presence is given.
 
 use super::Cut;
-use super::exchange::{
-    FromPhotons, GRAIN, Segment, emitted, gather, gather_photons, has_end, per_index, photon_values, segments,
-};
+use super::exchange::{GRAIN, Segment, emitted, gather, has_end, per_index, segments};
+use super::photons::{FromPhotons, gather_photons, photon_values, towards_camera};
 use super::weigh::{Sampled, Weights};
 use crate::math::luminance;
 use crate::shading::SurfaceClass;
@@ -66,11 +65,17 @@ impl Reflected {
         self.direct.clear();
         if wants_direct {
             let straight = per_index(s, |i| emitted(s, w, i, Some(0)));
-            let first = gather_photons(s, w, &self.segments, &values, cut, |p| p.bounces == 0);
+            let first = gather_photons(s, w, &self.segments, &values, cut, |bounces| bounces == 0);
             self.direct = gather(s, w, &straight, cut);
-            self.direct.par_iter_mut().zip(first).for_each(|(d, p)| *d += p.reflected);
+            let seen = |(i, (d, p)): (usize, (&mut Vec3, FromPhotons))| *d = towards_camera(s, i, *d, p);
+            self.direct.par_iter_mut().zip(first).enumerate().for_each(seen);
         }
         !cut.is_raised()
+    }
+
+    /// What arrival `i` reflects along its primary segment.
+    pub fn towards_camera(&self, s: Sampled, i: usize) -> Vec3 {
+        towards_camera(s, i, self.carried[i], self.photons[i])
     }
 
     /// Share of photons in the light that arrivals reflect: the mean over all of them.

@@ -53,11 +53,7 @@ pub struct End {
 impl End {
     /// Probability that a segment which arrives from `from` ends here.
     pub fn probability_from(&self, world: &World, from: Vec3) -> f32 {
-        match self.vertex.bsdf.has_delta() {
-            // layers hide each other by the direction they are seen from
-            true => world.bsdf(&self.hit, from).end_probability(from),
-            false => 1.0,
-        }
+        world.end_probability(&self.hit, &self.vertex.bsdf, from)
     }
 }
 

@@ -5,6 +5,7 @@
 //! arrivals of a cluster, so one sum of `q` serves all. Others are evaluated pair by pair, and the values of the
 //! lobes are kept for the gathering.
 
+use super::bridge::Bridges;
 use super::cluster::{Cluster, Clusters};
 use super::store::{CameraStore, LightStore, NextEvent};
 use super::{Cut, Estimator};
@@ -25,8 +26,8 @@ pub struct Density {
 }
 
 /// Lobe values of a cluster that does not factorise: for every camera arrival (and, if the literal recursion asks,
-/// every light arrival), those of the directions of all segments that leave, then those of all photons, the
-/// latter times `(n_o / n_i)^2`.
+/// every light arrival), those of the directions of all segments that leave, then those of all photons, then those of all
+/// bridges, the latter two times `(n_o / n_i)^2`.
 #[derive(Clone, Copy, Debug)]
 pub struct Matrix {
     batch: u32,
@@ -44,6 +45,8 @@ pub struct Weights {
     /// Basic radiance from next-event segments, reflected at every camera arrival; at light arrivals, for the
     /// literal recursion, towards where their paths go on.
     pub direct: Vec<Vec3>,
+    /// Irradiance, weighed, from the bridge of every camera arrival; empty without any.
+    pub bridged: Vec<Vec3>,
     /// One for every cluster; unused for diffuse ones.
     matrices: Vec<Matrix>,
     values: Vec<Vec<Vec3>>,
@@ -64,6 +67,8 @@ pub struct Sampled<'a> {
     pub light: &'a LightStore,
     /// The clusters.
     pub clusters: &'a Clusters,
+    /// The bridges between them, if any were sampled.
+    pub bridges: Option<&'a Bridges>,
 }
 
 impl<'a> Sampled<'a> {
@@ -100,7 +105,7 @@ impl<'a> Sampled<'a> {
 
     /// Replaces the value of every light arrival of the cluster, in their order, by the sum of those of its path: what
     /// is left out with it. A path that returns to a cluster is no more independent of itself than a photon is.
-    fn sum_over_paths(&self, c: &Cluster, values: &mut [f32]) {
+    pub fn sum_over_paths(&self, c: &Cluster, values: &mut [f32]) {
         // arrivals are in the order of their numbers, so those of a path follow each other
         let mut paths = self.lights(c).map(|j| self.path(j)).peekable();
         let mut start = 0;
@@ -120,6 +125,7 @@ impl<'a> Sampled<'a> {
 struct Batch {
     densities: Vec<Density>,
     direct: Vec<Vec3>,
+    bridged: Vec<Vec3>,
     starts: Vec<(u32, u32)>,
     values: Vec<Vec3>,
     owns: Vec<f32>,
@@ -157,15 +163,17 @@ impl Weights {
         }
         self.densities.clear();
         self.direct.clear();
+        self.bridged.clear();
         self.matrices.clear();
         let groups = s.clusters.clusters.chunks(BATCH);
         for ((b, batch), clusters) in (0..).zip(batches).zip(groups) {
             self.densities.extend(batch.densities);
             self.direct.extend(batch.direct);
+            self.bridged.extend(batch.bridged);
             self.matrices.extend(batch.starts.iter().zip(clusters).map(|(&(start, owns), c)| Matrix {
                 batch: b,
                 start,
-                columns: c.cameras + c.lights,
+                columns: columns(s, c) as u32,
                 owns,
                 lights: c.lights,
             }));
@@ -196,7 +204,7 @@ impl Weights {
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         self.densities.capacity() * size_of::<Density>()
-            + self.direct.capacity() * size_of::<Vec3>()
+            + (self.direct.capacity() + self.bridged.capacity()) * size_of::<Vec3>()
             + self.matrices.capacity() * size_of::<Matrix>()
             + self.values.iter().map(|v| v.capacity() * size_of::<Vec3>()).sum::<usize>()
             + self.owns.iter().map(|v| v.capacity() * size_of::<f32>()).sum::<usize>()
@@ -209,6 +217,11 @@ fn next_event_value(n: &NextEvent, p_cam: f32, c: &Cluster) -> Vec3 {
     let met = if n.is_delta { 0.0 } else { p_cam };
     let density = (met + n.next_event_pdf * c.cameras as f32) / c.area + n.light_density;
     if density > 0.0 { n.light / density } else { Vec3::ZERO }
+}
+
+/// Directions that are looked at in a cluster: of segments that leave, of photons, of bridges.
+fn columns(s: Sampled, c: &Cluster) -> usize {
+    (c.cameras + c.lights + s.bridges.map_or(0, |_| c.cameras)) as usize
 }
 
 fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
@@ -229,12 +242,17 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             .densities
             .push(Density { camera: q_camera * s.camera.outgoing[i].pdf, light: q_light * a.back_pdf });
         batch.direct.push(a.reflectance * arriving);
+        if let Some(bridges) = s.bridges {
+            let b = &bridges.segments[i];
+            batch.bridged.push(b.value(q_camera * b.pdf, c));
+        }
     }
     for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
         let a = &s.light.arrivals[j];
         let q = if estimator == Estimator::Literal { q_light } else { (q_light - own).max(0.0) };
         batch.densities.push(Density { camera: q_camera * a.back_pdf, light: q * s.light.photons[j].pdf });
         batch.direct.push(a.reflectance * arriving);
+        batch.bridged.extend(s.bridges.map(|_| Vec3::ZERO));
     }
 }
 
@@ -242,6 +260,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let cameras: Vec<(usize, Bsdf)> = s.cameras(c).map(|i| (i, s.camera.arrivals[i].bsdf(s.world))).collect();
     let lights: Vec<(usize, Bsdf)> = s.lights(c).map(|j| (j, s.light.arrivals[j].bsdf(s.world))).collect();
     let (n, m) = (cameras.len(), lights.len());
+    let width = columns(s, c);
     let first = batch.densities.len();
     batch.densities.resize(first + n + m, Density::default());
     batch.direct.resize(first + n + m, Vec3::ZERO);
@@ -262,8 +281,10 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let rows = gatherers.len();
     let owns = batch.owns.len();
     batch.owns.resize(owns + n * m, 0.0);
-    batch.values.resize(matrix + rows * (n + m), Vec3::ZERO);
+    batch.values.resize(matrix + rows * width, Vec3::ZERO);
     let densities = &mut batch.densities[first..];
+    let bridges = cameras.iter().filter_map(|(i, _)| Some(&s.bridges?.segments[*i]));
+    let mut bridge_pdfs = vec![0.0; n];
     let mut next_event_pdfs = vec![0.0; n];
     let mut next_event_values = vec![Vec3::ZERO; rows * n];
     for (row, (bsdf, wo, q)) in gatherers.iter().enumerate() {
@@ -272,7 +293,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             if s.camera.arrivals[*i].goes_on {
                 let (pdf, value) = look(s.camera.outgoing[*i].direction);
                 densities[column].camera += pdf;
-                batch.values[matrix + row * (n + m) + column] = value;
+                batch.values[matrix + row * width + column] = value;
             }
             let next_event = &s.camera.next_events[*i];
             if next_event.next_event_pdf > 0.0 {
@@ -285,8 +306,18 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             let w = s.light.arrivals[*j].wo;
             let (pdf, value) = look(w);
             densities[n + column].camera += pdf;
-            batch.values[matrix + row * (n + m) + n + column] = value / bsdf.relative_index(*wo, w).powi(2);
+            batch.values[matrix + row * width + n + column] = value / bsdf.relative_index(*wo, w).powi(2);
         }
+        for (column, b) in bridges.clone().enumerate() {
+            let (pdf, value) = look(b.direction);
+            bridge_pdfs[column] += pdf;
+            batch.values[matrix + row * width + n + m + column] =
+                value / bsdf.relative_index(*wo, b.direction).powi(2);
+        }
+    }
+    if s.bridges.is_some() {
+        batch.bridged.extend(bridges.zip(&bridge_pdfs).map(|(b, &p_cam)| b.value(p_cam, c)));
+        batch.bridged.resize(first + n + m, Vec3::ZERO);
     }
     for (t, (own, bsdf)) in lights.iter().enumerate() {
         let a = &s.light.arrivals[*own];

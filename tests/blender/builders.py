@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -162,12 +162,18 @@ def export() -> tuple[Any, list[str]]:
     if bpy.context.scene.camera is None:
         camera(Matrix.Translation((0, 0, 5)))
     settings()
+    warnings = warned(render)
+    return fake_segue.SCENES[-1], warnings
+
+
+def warned(function: Callable[[], None]) -> list[str]:
+    """Call `function`; what the add-on warned about meanwhile."""
     messages = _Messages()
     logger = logging.getLogger("segue.blender")
     logger.addHandler(messages)
-    bpy.ops.render.render()
+    function()
     logger.removeHandler(messages)
-    return fake_segue.SCENES[-1], messages.texts
+    return messages.texts
 
 
 def render(**options: Any) -> None:

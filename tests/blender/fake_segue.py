@@ -84,6 +84,13 @@ class Scene:
 SCENES: list[Scene] = []
 RENDERS: list[Render] = []
 
+# The curve in the statistics of every render; cases put other ones here.
+CURVE: list[dict[str, Any]] = [
+    {"seconds": 0.1, "samples": 1.0, "estimated_error": None, "estimated_bias": None},
+    {"seconds": 0.2, "samples": 2.0, "estimated_error": 0.2, "estimated_bias": 0.01},
+    {"seconds": 0.4, "samples": 4.0, "estimated_error": 0.1, "estimated_bias": 0.02},
+]
+
 _CHANNELS = {"Combined": 4, "Depth": 1, "ObjectIndex": 1, "MaterialIndex": 1, "Alpha": 1}
 
 
@@ -128,4 +135,11 @@ class Render:
         return result
 
     def stats(self) -> dict[str, Any]:
-        return {"samples": 4, "seconds": 0.4, "peak_memory_bytes": 2**20, "non_finite": 0}
+        return {
+            "samples": 4,
+            "seconds": 0.4,
+            "peak_memory_bytes": 2**20,
+            "non_finite": 0,
+            "estimated_error": CURVE[-1]["estimated_error"] if CURVE else None,
+            "curve": list(CURVE),
+        }

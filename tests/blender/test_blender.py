@@ -13,6 +13,7 @@ import pytest
 MODULES = {
     "agreement": "real",
     "camera": "fake",
+    "curve": "fake",
     "engine": "fake",
     "extension": "installed",
     "failures": "fake",

@@ -111,7 +111,7 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
     let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
     let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
     assert!(clusters.group(world, &grid, all, &ON) && clusters.measure(world, &grid, all, Areas::True, &ON));
-    let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters };
+    let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
     assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
     let n = camera.arrivals.len();
     let at = |i: usize| (weights.densities[clusters.place[i] as usize], f64::from(s.cluster_of(i).area));
@@ -187,7 +187,8 @@ fn densities_integrate_to_the_number_of_paths_that_go_on() {
             let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
             assert!(clusters.group(&world, &grid, all, &ON));
             assert!(clusters.measure(&world, &grid, all, Areas::True, &ON));
-            let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters };
+            let s =
+                Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
             assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
             let (mut integral, mut expected) = (0.0, 0.0);
             for c in clusters.clusters.iter().filter(|c| c.lights > 0) {

@@ -49,7 +49,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add(
         "--integrator",
         metavar="NAME",
-        help="method: segment (default), mvf, photon-filter, path, light, bdpt, ppm, bpm or vcm",
+        help="method: segment (default), segment-bridge, mvf, photon-filter, path, light, bdpt, "
+        "ppm, bpm or vcm",
     )
     add(
         "--kernel",
@@ -67,6 +68,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         choices=("leave-one-out", "literal"),
         help="how the segment method uses light segments: consistently (default), or by the "
         "paper's recursion as written, which is too bright where photons are few",
+    )
+    add(
+        "--bridges",
+        choices=("uniform", "power"),
+        help="how segment-bridge chooses the light segment to which a camera segment is joined: "
+        "all alike (default), or by the flux they carry",
     )
     stop = parser.add_mutually_exclusive_group()
     stop.add_argument(
@@ -129,6 +136,8 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
         settings["kernel_size"] = options.kernel_size
     if options.estimator:
         settings["estimator"] = options.estimator
+    if options.bridges:
+        settings["bridges"] = options.bridges
     if options.max_depth is not None:
         settings["max_depth"] = options.max_depth
     if options.passes:

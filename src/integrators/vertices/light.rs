@@ -1,8 +1,8 @@
 //! Light paths: their vertices, and the light that these send straight to the lens.
 
 use super::mis::{self, Sum};
-use super::splat::Splat;
 use super::vertex::{LightVertex, Rules, Vertex, survival_at};
+use crate::film::Splat;
 use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
 use crate::shading::{LightRay, Piece, SourceDensity, SurfaceClass};

@@ -23,17 +23,15 @@ mod camera;
 mod light;
 mod merge;
 pub mod mis;
-mod splat;
 mod vertex;
 
 use super::{Context, Integrator, IterationEnd, StageCosts};
-use crate::film::Sample;
+use crate::film::{Sample, SplatBuffer, is_wanted};
 use crate::math::Sampler;
 use crate::transport::kernel::Kernel;
 use camera::CameraSampler;
 use light::LightStore;
 use merge::PhotonMap;
-use splat::SplatBuffer;
 use std::f32::consts::PI;
 use vertex::Rules;
 
@@ -155,7 +153,7 @@ impl Integrator for Vertices {
 impl Vertices {
     fn trace_light(&mut self, context: &Context, rules: &Rules, index: u32) {
         let paths = rules.light_paths as u32;
-        let wanted = |film| splat::is_wanted(film, context.filter, context.crop);
+        let wanted = |film| is_wanted(film, context.filter, context.crop);
         let batches = context.light_batches(paths, |k, store, rays| {
             // the paths of one iteration are stratified among each other
             let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k);

@@ -10,7 +10,8 @@ use crate::transport::Estimator;
 use crate::transport::arrival::arrival;
 use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
-use crate::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing};
+use crate::transport::photons::photon_value;
+use crate::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing, Photon, Rivals};
 use crate::transport::walk::{Follow, Nobody};
 use std::sync::Arc;
 
@@ -122,7 +123,7 @@ fn the_weights_of_all_techniques_sum_to_one() {
             clusters.group(&world, &grid, all, &cut)
                 && clusters.measure(&world, &grid, all, Areas::OfPhotons, &cut)
         );
-        let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters };
+        let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
         assert!(weights.weigh(s, Estimator::LeaveOneOut, &cut));
         let constants = segments(s, &weights);
         let (mut checked, mut through_glass, mut shared) = (0, 0, 0);

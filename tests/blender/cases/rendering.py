@@ -262,3 +262,38 @@ def case_broken_data_does_not_crash() -> None:
     assert np.isfinite(picture).all()
     np.testing.assert_allclose(picture[24, 45, :3], (0.2, 0.4, 0.8), rtol=1e-3)
     assert scene.render.engine == "SEGUE"
+
+
+def case_the_error_curve_is_that_of_the_statistics() -> None:
+    from blender_addon import history, job, plot, preferences
+
+    scene = _scene()
+    builders.light("POINT", Matrix.Translation((0, 0, 3)), energy=50.0)
+    builders.link(builders.quad("Floor", size=4.0))
+    scene.segue.samples = 32
+    preferences.current().write_error_curve = True
+    told = []
+    finish = job._finish
+
+    def listen(engine: object, frame: object, stats: dict, error: str) -> None:
+        told.append((stats, error))
+        finish(engine, frame, stats, error)
+
+    job._finish = listen
+    _picture()
+    job._finish = finish
+    ((stats, error),) = told
+    points = stats["curve"]
+    assert points[-1]["estimated_error"] == stats["estimated_error"] > 0.0
+    assert points[-1]["estimated_bias"] is not None
+
+    lines = (OUTPUT / "picture_error.csv").read_text().splitlines()
+    names = ("seconds", "samples", "estimated_error", "estimated_bias")
+    assert lines[0] == ",".join(names)
+    found = [[float(v) if v else None for v in line.split(",")] for line in lines[1:]]
+    assert found == [[point[name] for name in names] for point in points]
+
+    assert history.shown(scene).text == error.capitalize()
+    picture = builders.read(OUTPUT / "picture_error.png")[..., :3]
+    assert (np.rint(255 * picture) == plot.ERROR).all(-1).any()
+    assert bpy.data.images[history.IMAGE].size[:] == (plot.SIZE, plot.SIZE)

@@ -1,6 +1,6 @@
 //! Light that arrives anywhere on the film, added up pixel by pixel in a fixed order.
 
-use crate::film::{Filter, Rect};
+use super::{Filter, Rect};
 use glam::{Vec2, Vec3};
 
 /// Light that arrives at a place of the film.
