@@ -232,3 +232,51 @@ fn the_systematic_error_of_large_kernels_is_told() {
     s.light(RECT);
     assert_eq!(s.render(16, 4, none).film().estimated_error().and_then(|e| e.bias), None);
 }
+
+/// Whole paths and the recursion are two estimators of the same light, with other weights.
+#[test]
+fn whole_paths_and_the_recursion_agree() {
+    let layered =
+        r#"{"surface":{"type":"principled","base_color":[0.8,0.3,0.2],"roughness":0.4,"coat":0.5}}"#;
+    let glossy = r#"{"surface":{"type":"glossy","color":0.8,"roughness":0.35}}"#;
+    let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
+    let rooms = [
+        ("diffuse", WALL, WALL, RECT, ""),
+        ("glossy", glossy, layered, RECT, ""),
+        ("glass", glass, WALL, RECT, ""),
+        ("light paths to a point", layered, WALL, POINT, r#","next_event":false"#),
+        ("both without next event", glossy, WALL, RECT, r#","next_event":false"#),
+    ];
+    for (name, ball, wall, light, set) in rooms {
+        let mut s = corner(ball, wall);
+        s.light(light);
+        s.light(DOME);
+        let reference = estimate(&s, 24, 384, Pass::Combined, PATH);
+        let recursive = estimate(&s, 24, 128, Pass::Combined, &segment(set));
+        for size in [0.5, 2.0] {
+            let set = format!(r#","integrator":"segment-path","kernel":"fixed","kernel_size":{size}{set}"#);
+            let whole = estimate(&s, 24, 128, Pass::Combined, &set);
+            assert_agree(&format!("{name}, {size} pixels, path"), whole, reference, 3e-3);
+            assert_agree(&format!("{name}, {size} pixels, segment"), whole, recursive, 3e-3);
+        }
+    }
+}
+
+#[test]
+fn whole_paths_count_bounces_as_path_tracing_does() {
+    let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
+    let mut s = corner(glass, WALL);
+    let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
+    s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
+    let whole = r#","integrator":"segment-path","kernel":"fixed","kernel_size":0.5"#;
+    for depth in [0, 1, 2, 3] {
+        let limit = format!(r#","max_depth":{depth}"#);
+        let reference = estimate(&s, 24, 256, Pass::Combined, &format!("{PATH}{limit}"));
+        let got = estimate(&s, 24, 128, Pass::Combined, &format!("{whole}{limit}"));
+        assert_agree(&format!("at most {depth} bounces"), got, reference, 3e-3);
+    }
+    for pass in [Pass::Direct, Pass::Indirect] {
+        let reference = estimate(&s, 24, 256, pass, PATH);
+        assert_agree(pass.name(), estimate(&s, 24, 128, pass, whole), reference, 5e-3);
+    }
+}

@@ -19,9 +19,9 @@ pub(super) struct Segment {
     /// Factor on what its end reflects: `T / D_R`.
     pub carry: Vec3,
     /// Density of the camera's techniques: `c P_cam / A_x`.
-    camera: f32,
+    pub camera: f32,
     /// Factor on `P_light` that makes it the density of the light's techniques: `c / (A_y n_rel^2)`.
-    light: f32,
+    pub light: f32,
     /// Own-path continuation: `P_cam / (q p)`.
     pub continuation: f32,
 }
