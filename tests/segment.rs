@@ -53,6 +53,9 @@ const SETS: [(&str, &str); 6] = [
     ("light and next event", r#","camera_paths":false,"light_paths":1"#),
 ];
 
+const NO_NEXT_EVENT: &str = SETS[3].1;
+const LIGHT_ALONE: &str = SETS[4].1;
+
 #[test]
 fn every_set_of_techniques_finds_the_light_of_a_diffuse_room() {
     let mut s = corner(WALL, WALL);
@@ -234,32 +237,39 @@ fn the_systematic_error_of_large_kernels_is_told() {
 }
 
 /// Whole paths and the recursion are two estimators of the same light, with other weights.
+fn assert_whole_paths_agree(what: &str, ball: &str, wall: &str, light: &str, set: &str) {
+    let mut s = corner(ball, wall);
+    s.light(light);
+    let reference = estimate(&s, 24, 192, Pass::Combined, PATH);
+    let recursive = estimate(&s, 24, 48, Pass::Combined, &segment(set));
+    for size in [0.5, 2.0] {
+        let set = format!(r#","integrator":"segment-path","kernel":"fixed","kernel_size":{size}{set}"#);
+        let whole = estimate(&s, 24, 48, Pass::Combined, &set);
+        assert_agree(&format!("{what}, {size} pixels, path"), whole, reference, 3e-3);
+        assert_agree(&format!("{what}, {size} pixels, segment"), whole, recursive, 3e-3);
+    }
+}
+
 #[test]
-fn whole_paths_and_the_recursion_agree() {
+fn whole_paths_find_the_light_of_diffuse_rooms() {
+    assert_whole_paths_agree("diffuse", WALL, WALL, RECT, "");
+    assert_whole_paths_agree("diffuse, no next event", WALL, WALL, RECT, NO_NEXT_EVENT);
+}
+
+#[test]
+fn whole_paths_find_the_light_of_glossy_rooms() {
     let layered =
         r#"{"surface":{"type":"principled","base_color":[0.8,0.3,0.2],"roughness":0.4,"coat":0.5}}"#;
     let glossy = r#"{"surface":{"type":"glossy","color":0.8,"roughness":0.35}}"#;
+    assert_whole_paths_agree("glossy", glossy, layered, RECT, "");
+    assert_whole_paths_agree("glossy, no next event", glossy, layered, RECT, NO_NEXT_EVENT);
+}
+
+#[test]
+fn whole_paths_find_light_through_glass_and_of_points() {
     let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
-    let rooms = [
-        ("diffuse", WALL, WALL, RECT, ""),
-        ("glossy", glossy, layered, RECT, ""),
-        ("glass", glass, WALL, RECT, ""),
-        ("light paths to a point", layered, WALL, POINT, r#","next_event":false"#),
-        ("both without next event", glossy, WALL, RECT, r#","next_event":false"#),
-    ];
-    for (name, ball, wall, light, set) in rooms {
-        let mut s = corner(ball, wall);
-        s.light(light);
-        s.light(DOME);
-        let reference = estimate(&s, 24, 384, Pass::Combined, PATH);
-        let recursive = estimate(&s, 24, 128, Pass::Combined, &segment(set));
-        for size in [0.5, 2.0] {
-            let set = format!(r#","integrator":"segment-path","kernel":"fixed","kernel_size":{size}{set}"#);
-            let whole = estimate(&s, 24, 128, Pass::Combined, &set);
-            assert_agree(&format!("{name}, {size} pixels, path"), whole, reference, 3e-3);
-            assert_agree(&format!("{name}, {size} pixels, segment"), whole, recursive, 3e-3);
-        }
-    }
+    assert_whole_paths_agree("glass", glass, WALL, RECT, "");
+    assert_whole_paths_agree("point, light paths alone", WALL, WALL, POINT, LIGHT_ALONE);
 }
 
 #[test]
@@ -271,12 +281,12 @@ fn whole_paths_count_bounces_as_path_tracing_does() {
     let whole = r#","integrator":"segment-path","kernel":"fixed","kernel_size":0.5"#;
     for depth in [0, 1, 2, 3] {
         let limit = format!(r#","max_depth":{depth}"#);
-        let reference = estimate(&s, 24, 256, Pass::Combined, &format!("{PATH}{limit}"));
-        let got = estimate(&s, 24, 128, Pass::Combined, &format!("{whole}{limit}"));
+        let reference = estimate(&s, 24, 192, Pass::Combined, &format!("{PATH}{limit}"));
+        let got = estimate(&s, 24, 48, Pass::Combined, &format!("{whole}{limit}"));
         assert_agree(&format!("at most {depth} bounces"), got, reference, 3e-3);
     }
     for pass in [Pass::Direct, Pass::Indirect] {
-        let reference = estimate(&s, 24, 256, pass, PATH);
-        assert_agree(pass.name(), estimate(&s, 24, 128, pass, whole), reference, 5e-3);
+        let reference = estimate(&s, 24, 192, pass, PATH);
+        assert_agree(pass.name(), estimate(&s, 24, 64, pass, whole), reference, 5e-3);
     }
 }

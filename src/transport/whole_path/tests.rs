@@ -57,7 +57,7 @@ fn path(world: &World, number: u32) -> Option<Vec<Point>> {
             return None;
         };
         let back = vertex.bsdf.continuous_pdf(to_light, end.wo).0;
-        let light = End { hit: end.hit.clone(), vertex, wo: to_light, opacity, end_probability: 1.0 };
+        let light = End { hit: end.hit, vertex, wo: to_light, opacity, end_probability: 1.0 };
         let light = Arrival { goes_on: true, ..arrival(world, &light) };
         piece = Piece::leaving(&end.hit, to_light);
         points.push(Point {
