@@ -232,3 +232,66 @@ fn the_systematic_error_of_large_kernels_is_told() {
     s.light(RECT);
     assert_eq!(s.render(16, 4, none).film().estimated_error().and_then(|e| e.bias), None);
 }
+
+/// Whole paths and the recursion are two estimators of the same light, with other weights. Their samples are the same, so
+/// they differ by less than from the path tracer.
+fn assert_whole_paths_agree(what: &str, ball: &str, wall: &str, light: &str, sizes: &[f32], set: &str) {
+    let mut s = corner(ball, wall);
+    s.light(light);
+    let estimate = |samples, settings: &str| common::estimate(&s, (24, samples, 8), Pass::Combined, settings);
+    let reference = estimate(192, PATH);
+    for size in sizes {
+        let render = |method: &str| {
+            estimate(32, &format!(r#","integrator":"{method}","kernel":"fixed","kernel_size":{size}{set}"#))
+        };
+        let whole = render("segment-path");
+        assert_agree(&format!("{what}, {size} pixels, path"), whole, reference, 3e-3);
+        assert_agree(&format!("{what}, {size} pixels, segment"), whole, render("segment"), 3e-3);
+    }
+}
+
+#[test]
+fn whole_paths_find_the_light_of_diffuse_rooms() {
+    assert_whole_paths_agree("diffuse", WALL, WALL, RECT, &[0.5, 2.0], "");
+    assert_whole_paths_agree("diffuse, no next event", WALL, WALL, RECT, &[2.0], SETS[3].1);
+}
+
+const LAYERED: &str =
+    r#"{"surface":{"type":"principled","base_color":[0.8,0.3,0.2],"roughness":0.4,"coat":0.5}}"#;
+const GLOSSY: &str = r#"{"surface":{"type":"glossy","color":0.8,"roughness":0.35}}"#;
+
+#[test]
+fn whole_paths_find_the_light_of_glossy_rooms() {
+    assert_whole_paths_agree("glossy", GLOSSY, LAYERED, RECT, &[2.0], "");
+}
+
+#[test]
+fn whole_paths_find_the_light_of_glossy_rooms_without_next_event() {
+    assert_whole_paths_agree("glossy, no next event", GLOSSY, LAYERED, RECT, &[0.5, 2.0], SETS[3].1);
+}
+
+#[test]
+fn whole_paths_find_light_through_glass_and_of_points() {
+    let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
+    assert_whole_paths_agree("glass", glass, WALL, RECT, &[0.5, 2.0], "");
+    assert_whole_paths_agree("point, light paths alone", WALL, WALL, POINT, &[2.0], SETS[4].1);
+}
+
+#[test]
+fn whole_paths_count_bounces_as_path_tracing_does() {
+    let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
+    let mut s = corner(glass, WALL);
+    let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
+    s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
+    let whole = r#","integrator":"segment-path","kernel":"fixed","kernel_size":0.5"#;
+    for depth in [0, 1, 2, 3] {
+        let limit = format!(r#","max_depth":{depth}"#);
+        let reference = estimate(&s, 24, 192, Pass::Combined, &format!("{PATH}{limit}"));
+        let got = estimate(&s, 24, 48, Pass::Combined, &format!("{whole}{limit}"));
+        assert_agree(&format!("at most {depth} bounces"), got, reference, 3e-3);
+    }
+    for pass in [Pass::Direct, Pass::Indirect] {
+        let reference = estimate(&s, 24, 192, pass, PATH);
+        assert_agree(pass.name(), estimate(&s, 24, 48, pass, whole), reference, 5e-3);
+    }
+}

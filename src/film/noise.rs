@@ -6,7 +6,8 @@
 //! estimate of the variance of their mean. Systematic error is invisible to it: see `bias`.
 //!
 //! The `r` of the denominator cannot be the pixel itself: where it happens to be dark the quotient explodes.
-//! It is the mean of the pixel's neighbourhood, drawn back to the pixel where that differs from its
+//! It is the mean of the pixel's neighbours (not of itself: one far too bright sample would hide the error that it
+//! tells of), drawn back to the pixel where that differs from its
 //! neighbours by more than noise explains (the local linear estimator of J.-S. Lee, "Digital Image
 //! Enhancement and Noise Filtering by Use of Local Statistics", 1980).
 
@@ -153,14 +154,19 @@ fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> V
         let near = &columns[x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width)];
         let window: Window = near.iter().copied().sum();
         let (mean, variance) = (pixel.mean.as_dvec3(), pixel.variance.as_dvec3());
-        let smooth = window.mean / window.count;
+        let others = (window.count - 1.0).max(1.0);
+        // an only pixel has itself alone; a difference may be below zero by rounding
+        let smooth = if window.count > 1.0 { ((window.mean - mean) / others).max(DVec3::ZERO) } else { mean };
         let excess = mean - smooth;
         // one pixel's estimate of variance is often far too small
-        let noise = variance.max(window.variance / window.count);
+        let around = ((window.variance - variance) / others).max(DVec3::ZERO);
+        let noise = variance.max(around);
         // share of the squared difference that noise does not explain; no difference, nothing to draw back
         let trust = (1.0 - noise / (excess * excess).max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO);
         let truth = smooth + trust * excess;
-        (truth * truth + floor).powf(-0.5).as_vec3()
+        // one over the square of a noisy mean is too large by three of its relative variances
+        let convexity = 3.0 * around / others * (1.0 - trust);
+        (truth * truth + convexity + floor).powf(-0.5).as_vec3()
     };
     pixels[y * width..][..width].iter().enumerate().map(scale).collect()
 }

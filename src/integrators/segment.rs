@@ -109,7 +109,7 @@ impl Segment {
         costs.stage("clustering", self.clusters.bytes());
         let areas = match self.techniques.estimator {
             _ if light_paths == 0.0 => Areas::None,
-            Estimator::LeaveOneOut => Areas::OfPhotons,
+            Estimator::LeaveOneOut | Estimator::WholePath => Areas::OfPhotons,
             Estimator::Literal => Areas::True,
         };
         if !self.clusters.measure(world, &grid, all, areas, cut) {
@@ -160,8 +160,15 @@ impl Segment {
         let (weights, reflected) = (&self.weights, &mut self.reflected);
         let solved = match (self.techniques.estimator, context.max_depth) {
             (Estimator::Literal, limit) => reflected.solve_literal(sampled, weights, &first(), limit, cut),
-            (_, None) => reflected.solve(sampled, weights, &self.starts, wants_direct, cut),
-            (_, Some(limit)) => reflected.solve_limited(sampled, weights, &first(), limit, cut),
+            (Estimator::WholePath, limit) => {
+                reflected.solve_whole_paths(sampled, weights, &first(), limit, cut)
+            }
+            (Estimator::LeaveOneOut, None) => {
+                reflected.solve(sampled, weights, &self.starts, wants_direct, cut)
+            }
+            (Estimator::LeaveOneOut, Some(limit)) => {
+                reflected.solve_limited(sampled, weights, &first(), limit, cut)
+            }
         };
         if !context.keep_all && self.techniques.can_do_without_light_paths() {
             // few light paths bring less, as balanced weights go; what all of them would bring counts

@@ -12,7 +12,7 @@ use crate::integrators::vertices::Vertices;
 use crate::integrators::{Context, Counters, Integrator, IterationEnd, StopSign};
 use crate::scene::{Scene, SceneError};
 use crate::shading::{BuildCost, Sensor, World, WorldError};
-use crate::transport::Techniques;
+use crate::transport::{Estimator, Techniques};
 use clock::Stopwatch;
 use serde::Serialize;
 use settings::{Method, Settings};
@@ -177,6 +177,9 @@ impl Session {
             Method::Segment | Method::SegmentBridge => Box::new(Segment::new(techniques)),
             Method::Mvf => Box::new(Segment::new(Techniques { light_paths: 0.0, ..techniques })),
             Method::PhotonFilter => Box::new(Segment::new(Techniques { camera_paths: false, ..techniques })),
+            Method::SegmentPath => {
+                Box::new(Segment::new(Techniques { estimator: Estimator::WholePath, ..techniques }))
+            }
             Method::Light => Box::new(Vertices::light_tracing(light_paths)),
             Method::Bdpt => Box::new(Vertices::bidirectional(light_paths)),
             Method::Ppm => Box::new(Vertices::photon_mapping(kernel, light_paths)),

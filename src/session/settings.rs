@@ -19,6 +19,8 @@ pub enum Method {
     Mvf,
     /// Its light segments, gathered where camera paths first arrive.
     PhotonFilter,
+    /// Its paths formed one by one and weighed as a whole, as a check.
+    SegmentPath,
     /// Unidirectional path tracing with next-event estimation.
     Path,
     /// Light tracing.
@@ -35,7 +37,7 @@ pub enum Method {
 
 impl Method {
     fn needs_light_paths(self) -> bool {
-        !matches!(self, Self::Segment | Self::Mvf | Self::Path)
+        !matches!(self, Self::Segment | Self::Mvf | Self::SegmentPath | Self::Path)
     }
 }
 

@@ -12,9 +12,22 @@ const SURVIVAL: [f32; 2] = [0.05, 0.98];
 /// Probability `q` with which a path goes on from a surface: the albedo of what is continuous, given that the
 /// segment ended there.
 pub fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
-    let albedo = bsdf.continuous_albedo(wo).max_element() / end_probability;
+    bounded(bsdf.continuous_albedo(wo).max_element() / end_probability)
+}
+
+fn bounded(albedo: f32) -> f32 {
     // false for NaN
     if albedo > SURVIVAL[0] { albedo.min(SURVIVAL[1]) } else { SURVIVAL[0] }
+}
+
+/// How a path that came to an arrival from `from` would go on back along the segment that ended there: the probability
+/// that it does at all, and the density of that direction.
+pub fn reversed(world: &World, a: &Arrival, from: Vec3) -> (f32, f32) {
+    if a.class == SurfaceClass::Diffuse {
+        return (bounded(a.reflectance.max_element()), a.back_pdf);
+    }
+    let bsdf = a.bsdf_from(world, from);
+    (survival(&bsdf, from, bsdf.end_probability(from)), bsdf.continuous_pdf(from, a.wo).0)
 }
 
 /// The same at the first arrivals of a camera path, which decide most of the picture's noise: paths are longer there.

@@ -12,7 +12,7 @@ use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, Surface
 use glam::Vec3;
 
 /// Arrivals of a path at which it is let go more rarely.
-const EARLY: usize = 2;
+pub(super) const EARLY: usize = 2;
 
 /// What a pixel sees along its primary segment.
 #[derive(Clone, Copy, Debug)]

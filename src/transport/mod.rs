@@ -17,8 +17,11 @@ mod photons;
 pub mod propagate;
 pub mod report;
 pub mod store;
+#[cfg(test)]
+mod testing;
 pub mod walk;
 pub mod weigh;
+mod whole_path;
 
 /// Asked now and then whether to stop.
 #[derive(Clone, Copy)]
@@ -40,6 +43,8 @@ pub enum Estimator {
     LeaveOneOut,
     /// The paper's recursion as written: what a light segment brings is gathered where it came from.
     Literal,
+    /// No recursion: paths of segments are formed one by one and weighed as a whole (S16, S17), as a check.
+    WholePath,
 }
 
 /// Which segments are sampled, how they are weighed, and how large the kernel is.

@@ -20,9 +20,18 @@ use std::borrow::Cow;
 pub struct Density {
     /// `P_cam` of the segment that leaves a camera arrival, or that brought a light arrival.
     pub camera: f32,
-    /// `P_light` of the segment that brought a camera arrival; of the segment that leaves a light arrival, without
-    /// the part of its own path, unless the literal recursion asks.
+    /// `P_light` of the segment that brought a camera arrival; of the segment that leaves a light arrival, for
+    /// leaving one out without the part of its own path.
     pub light: f32,
+}
+
+/// The next-event segment of a camera arrival.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TowardsLight {
+    /// Value of the arrival's own lobes.
+    pub value: Vec3,
+    /// `P_cam` along it.
+    pub camera: f32,
 }
 
 /// Lobe values of a cluster that does not factorise: for every camera arrival (and, if the literal recursion asks,
@@ -47,6 +56,8 @@ pub struct Weights {
     pub direct: Vec<Vec3>,
     /// Irradiance, weighed, from the bridge of every camera arrival; empty without any.
     pub bridged: Vec<Vec3>,
+    /// One for every arrival, of use for those of the camera; empty unless whole paths are asked for.
+    pub towards_lights: Vec<TowardsLight>,
     /// One for every cluster; unused for diffuse ones.
     matrices: Vec<Matrix>,
     values: Vec<Vec<Vec3>>,
@@ -126,6 +137,7 @@ struct Batch {
     densities: Vec<Density>,
     direct: Vec<Vec3>,
     bridged: Vec<Vec3>,
+    towards_lights: Vec<TowardsLight>,
     starts: Vec<(u32, u32)>,
     values: Vec<Vec3>,
     owns: Vec<f32>,
@@ -164,12 +176,14 @@ impl Weights {
         self.densities.clear();
         self.direct.clear();
         self.bridged.clear();
+        self.towards_lights.clear();
         self.matrices.clear();
         let groups = s.clusters.clusters.chunks(BATCH);
         for ((b, batch), clusters) in (0..).zip(batches).zip(groups) {
             self.densities.extend(batch.densities);
             self.direct.extend(batch.direct);
             self.bridged.extend(batch.bridged);
+            self.towards_lights.extend(batch.towards_lights);
             self.matrices.extend(batch.starts.iter().zip(clusters).map(|(&(start, owns), c)| Matrix {
                 batch: b,
                 start,
@@ -205,6 +219,7 @@ impl Weights {
     pub fn bytes(&self) -> usize {
         self.densities.capacity() * size_of::<Density>()
             + (self.direct.capacity() + self.bridged.capacity()) * size_of::<Vec3>()
+            + self.towards_lights.capacity() * size_of::<TowardsLight>()
             + self.matrices.capacity() * size_of::<Matrix>()
             + self.values.iter().map(|v| v.capacity() * size_of::<Vec3>()).sum::<usize>()
             + self.owns.iter().map(|v| v.capacity() * size_of::<f32>()).sum::<usize>()
@@ -249,10 +264,20 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     }
     for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
         let a = &s.light.arrivals[j];
-        let q = if estimator == Estimator::Literal { q_light } else { (q_light - own).max(0.0) };
+        let q = match estimator {
+            Estimator::LeaveOneOut => (q_light - own).max(0.0),
+            Estimator::Literal | Estimator::WholePath => q_light,
+        };
         batch.densities.push(Density { camera: q_camera * a.back_pdf, light: q * s.light.photons[j].pdf });
         batch.direct.push(a.reflectance * arriving);
         batch.bridged.extend(s.bridges.map(|_| Vec3::ZERO));
+    }
+    if estimator == Estimator::WholePath {
+        batch.towards_lights.extend(s.cameras(c).map(|i| {
+            let pdf = s.camera.next_events[i].pdf;
+            TowardsLight { value: s.camera.arrivals[i].reflectance * pdf, camera: q_camera * pdf }
+        }));
+        batch.towards_lights.resize(batch.densities.len(), TowardsLight::default());
     }
 }
 
@@ -328,7 +353,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             batch.owns[owns + row * m + t] = part;
         }
         for (other, (j, _)) in lights.iter().enumerate() {
-            let is_rival = estimator == Estimator::Literal || s.path(*j) != s.path(*own);
+            let is_rival = estimator != Estimator::LeaveOneOut || s.path(*j) != s.path(*own);
             if is_rival && s.light.arrivals[*j].goes_on {
                 densities[n + other].light += pdf(s.light.photons[*j].direction);
             }
@@ -345,5 +370,10 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
                 batch.direct[first + row] += next_event_values[row * n + column] * value;
             }
         }
+    }
+    if estimator == Estimator::WholePath {
+        let own = |k: usize| TowardsLight { value: next_event_values[k * n + k], camera: next_event_pdfs[k] };
+        batch.towards_lights.extend((0..n).map(own));
+        batch.towards_lights.resize(batch.densities.len(), TowardsLight::default());
     }
 }

@@ -49,8 +49,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add(
         "--integrator",
         metavar="NAME",
-        help="method: segment (default), segment-bridge, mvf, photon-filter, path, light, bdpt, "
-        "ppm, bpm or vcm",
+        help="method: segment (default), segment-bridge, mvf, photon-filter, segment-path, path, "
+        "light, bdpt, ppm, bpm or vcm",
     )
     add(
         "--kernel",

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::math::{Sampler, warp};
-use crate::scene::mesh::MeshInput;
-use crate::scene::{Camera, InstanceGroup, SceneBuilder};
+use crate::scene::Camera;
 use crate::shading::bsdf::Walk;
 use crate::shading::{CameraRay, Piece, Sensor, World};
 use crate::transport::Estimator;
@@ -12,40 +11,8 @@ use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
 use crate::transport::photons::photon_value;
 use crate::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing, Photon, Rivals};
+use crate::transport::testing::{CAMERA, room};
 use crate::transport::walk::{Follow, Nobody};
-use std::sync::Arc;
-
-const CAMERA: &str = r#"{"window":[-1,1,-1,1]}"#;
-
-/// A closed room of one material, with a pane of glass across it.
-fn room(wall: &str) -> World {
-    let mut b = SceneBuilder::default();
-    let identity: [f64; 16] = std::array::from_fn(|k| f64::from(u8::from(k % 5 == 0)));
-    let mut place = |points: &[Vec3], faces: &[u32], material: &str| {
-        let material = b.add_material("material", material).unwrap();
-        let input = MeshInput { name: "mesh", points, face_indices: faces, ..Default::default() };
-        let mesh = b.add_mesh(&input).unwrap();
-        let group = InstanceGroup {
-            name: "object".into(),
-            mesh,
-            materials: vec![material],
-            camera_visible: true,
-            two_sided_emission: true,
-            object_index: 0,
-        };
-        b.add_instances(group, &[identity]).unwrap();
-    };
-    let corner = |k: u32| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32) * 2.0 - 1.0;
-    #[rustfmt::skip]
-    let faces = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3];
-    let cube: Vec<Vec3> = (0..8).map(corner).collect();
-    place(&cube, &faces, wall);
-    let pane: Vec<Vec3> = cube.iter().map(|p| *p * Vec3::new(0.8, 0.8, 0.05)).collect();
-    let outwards: Vec<u32> = faces.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
-    place(&pane, &outwards, r#"{"surface":{"type":"glass","ior":1.5}}"#);
-    b.set_camera("camera", CAMERA).unwrap();
-    World::new(Arc::new(b.build().unwrap()), false).unwrap()
-}
 
 /// Camera segments, and the same segments made by light paths: arrival `2 k` of the light's side stands where segment
 /// `k` ends and arrival `2 k + 1` where it begins.
