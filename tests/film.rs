@@ -29,6 +29,7 @@ fn noisy(x: u32, y: u32, iteration: u32) -> Sample {
     };
     Sample {
         unfiltered: None,
+        kernel_octaves: None,
         radiance: emission + direct + rgb(18),
         alpha: u(21),
         emission,

@@ -227,10 +227,9 @@ fn the_systematic_error_of_large_kernels_is_told() {
             assert!(fine < 2e-4 && coarse > 5e-4, "{ball}, {wall}{more}: {fine}, {coarse}");
         }
     }
-    let none = r#","integrator":"segment","camera_paths":false"#;
     let mut s = corner(WALL, WALL);
     s.light(RECT);
-    assert_eq!(s.render(16, 4, none).film().estimated_error().and_then(|e| e.bias), None);
+    assert_eq!(s.render(16, 4, PATH).film().estimated_error().and_then(|e| e.bias), None);
 }
 
 /// Whole paths and the recursion are two estimators of the same light, with other weights. Their samples are the same, so

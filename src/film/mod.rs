@@ -12,6 +12,7 @@
 mod bias;
 mod buffer;
 mod error;
+mod error_estimate;
 mod filter;
 mod noise;
 mod openexr;
@@ -23,8 +24,8 @@ mod tile;
 
 pub use buffer::{Film, SharedTile, TILE_SIZE};
 pub use error::FilmError;
+pub use error_estimate::ErrorEstimate;
 pub use filter::{Filter, FilterKind};
-pub use noise::ErrorEstimate;
 pub use openexr::{Compression, ExrOptions};
 pub use pass::{Pass, PassSet};
 pub use rect::Rect;

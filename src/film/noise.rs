@@ -1,7 +1,6 @@
 //! How wrong the picture is, told without a reference: noise.
 //!
-//! The relative mean squared error of a picture `x` against the truth `r`, over pixels and channels, is
-//! `mean((x - r)² / (r² + (0.01 mean r)²))`. The squared error is estimated from the two halves of each
+//! The squared error is estimated from the two halves of each
 //! pixel's samples, which are independent pictures of the same thing: `((a - b) / 2)²` is an unbiased
 //! estimate of the variance of their mean. Systematic error is invisible to it: see `bias`.
 //!
@@ -11,7 +10,7 @@
 //! neighbours by more than noise explains (the local linear estimator of J.-S. Lee, "Digital Image
 //! Enhancement and Noise Filtering by Use of Local Statistics", 1980).
 
-use super::{Film, Tile, bias};
+use super::Tile;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::iter::Sum;
@@ -22,74 +21,14 @@ const RADIUS: usize = 2;
 
 /// A pixel that has been sampled at least twice.
 #[derive(Clone, Copy)]
-struct Pixel {
-    mean: Vec3,
+pub(super) struct Pixel {
+    pub mean: Vec3,
     /// Estimated variance of `mean`.
-    variance: Vec3,
+    pub variance: Vec3,
 }
 
-/// Estimated relative mean squared error of a picture: the sum of its parts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ErrorEstimate {
-    /// The part that more samples average out.
-    pub noise: f64,
-    /// The part that is systematic, as far as it is beyond doubt; `None` if the samples had no unfiltered estimates
-    /// to tell it by.
-    pub bias: Option<f64>,
-}
-
-impl ErrorEstimate {
-    /// Both parts.
-    pub fn total(&self) -> f64 {
-        self.noise + self.bias.unwrap_or(0.0)
-    }
-}
-
-impl Film {
-    /// Estimated error of the picture as it stands now; `None` before any pixel has two samples (pixels with fewer
-    /// are left out).
-    ///
-    /// The noise is right on average for independent samples. Samples that are spread evenly on purpose
-    /// (low-discrepancy sequences) make the picture better than their halves tell, so it errs to the safe side
-    /// there. It reads the whole film, in parallel: ask between iterations, not for every tile.
-    pub fn estimated_error(&self) -> Option<ErrorEstimate> {
-        let (width, area) = (self.width() as usize, self.rect().area());
-        let (mut pixels, mut differences) = (vec![None; area], Vec::new());
-        self.visit(self.rect(), |tile, pixel, place| {
-            pixels[place] = estimate(tile, pixel);
-            if let (Some(d), Some(_)) = (tile.differences(pixel), pixels[place]) {
-                let (_, [n, m]) = tile.halves(pixel);
-                differences.resize(area, [Vec3::ZERO; 2]);
-                differences[place] = [d[0] / n as f32, d[1] / m as f32];
-            }
-        });
-        let count = pixels.iter().flatten().count();
-        if count == 0 {
-            return None;
-        }
-        let Some(scales) = scales(&pixels, width) else {
-            // wholly black: no light was found, and nothing disagrees
-            return Some(ErrorEstimate { noise: 0.0, bias: None });
-        };
-        let square = |(p, scale): (&Option<Pixel>, &Vec3)| {
-            p.map_or(0.0, |p| (p.variance.as_dvec3() * scale.as_dvec3().powf(2.0)).element_sum())
-        };
-        // what rows give is summed in their order, whatever thread it came from
-        let rows: Vec<f64> = (pixels.par_chunks(width).zip(scales.par_chunks(width)))
-            .map(|(row, scales)| row.iter().zip(scales).map(square).sum())
-            .collect();
-        let noise = rows.iter().sum::<f64>() / (3 * count) as f64;
-        let bias = (!differences.is_empty()).then(|| {
-            for (d, scale) in differences.iter_mut().zip(&scales) {
-                *d = d.map(|d| d * scale);
-            }
-            bias::mean_square(&differences, width) / count as f64
-        });
-        Some(ErrorEstimate { noise, bias })
-    }
-}
-
-fn estimate(tile: &Tile, pixel: usize) -> Option<Pixel> {
+/// What a pixel's two halves tell; `None` before both have a sample.
+pub(super) fn of_pixel(tile: &Tile, pixel: usize) -> Option<Pixel> {
     let ([even, odd], counts) = tile.halves(pixel);
     let [n, m] = counts.map(f64::from);
     (m > 0.0).then(|| {
@@ -132,7 +71,7 @@ impl Sum for Window {
 
 /// What differences are multiplied with to be relative ones, `1 / sqrt(r² + (0.01 mean r)²)`, for a picture of rows of
 /// `width` pixels; zero where nothing is known. `None` if all is black.
-fn scales(pixels: &[Option<Pixel>], width: usize) -> Option<Vec<Vec3>> {
+pub(super) fn scales(pixels: &[Option<Pixel>], width: usize) -> Option<Vec<Vec3>> {
     let row_sums: Vec<Window> =
         pixels.par_chunks(width).map(|row| row.iter().map(Window::from).sum()).collect();
     let known: Window = row_sums.into_iter().sum();
@@ -174,7 +113,7 @@ fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Film, PassSet, Sample};
+    use crate::film::{ErrorEstimate, Film, PassSet, Sample};
     use crate::math::sampler::{hash, hash_unit};
 
     const SIZE: (u32, u32) = (160, 120);

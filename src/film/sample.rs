@@ -13,6 +13,9 @@ pub struct Sample {
     /// Another estimate of `radiance` from the same sample, without systematic errors; where the integrator has
     /// one, [`super::Film::estimated_error`] tells them. It need not be finite.
     pub unfiltered: Option<Vec3>,
+    /// Logarithm, in octaves, of the size of the kernel that filtered it over the nominal size, where that varies at random
+    /// and is zero on average: it tells systematic errors, too.
+    pub kernel_octaves: Option<f32>,
     /// Part of `radiance` that reaches the camera unscattered from its emitter.
     pub emission: Vec3,
     /// Part of `radiance` that was scattered once; what is neither this nor `emission` is indirect.

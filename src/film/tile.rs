@@ -1,5 +1,6 @@
 //! Tiles: the sums of a small rectangle of the film.
 
+use super::bias::Slope;
 use super::{FirstHit, Pass, PassSet, Rect, Sample};
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::TryReserveError;
@@ -18,6 +19,8 @@ pub struct Tile {
     halves: Vec<[DVec3; 2]>,
     /// Sums, likewise, of radiance less its unfiltered estimate; empty until a sample has one.
     differences: Vec<[Vec3; 2]>,
+    /// The same of radiance over the kernel's size; empty until a sample has one.
+    slopes: Vec<[Slope; 2]>,
     /// Sums of coverage.
     alpha: Vec<f64>,
     sums: Sums,
@@ -87,6 +90,7 @@ impl Tile {
             counts: zeros(true, n)?,
             halves: zeros(true, n)?,
             differences: Vec::new(),
+            slopes: Vec::new(),
             alpha: zeros(true, n)?,
             sums: Sums {
                 normal: zeros(kept(Pass::Normal), n)?,
@@ -119,7 +123,11 @@ impl Tile {
             Pass::Uv => size_of::<Vec2>(),
             Pass::ObjectIndex | Pass::MaterialIndex => size_of::<u32>(),
         };
-        let always = size_of::<u32>() + size_of::<[DVec3; 2]>() + size_of::<[Vec3; 2]>() + size_of::<f64>();
+        let always = size_of::<u32>()
+            + size_of::<[DVec3; 2]>()
+            + size_of::<[Vec3; 2]>()
+            + size_of::<[Slope; 2]>()
+            + size_of::<f64>();
         let seen = if passes.iter().any(Pass::is_first_hit) { size_of::<bool>() } else { 0 };
         (always + seen + passes.iter().map(pass_bytes).sum::<usize>()) as u64
     }
@@ -144,6 +152,10 @@ impl Tile {
             self.differences.resize(self.counts.len(), Default::default());
             let difference = sample.radiance - unfiltered;
             self.differences[pixel][half] += if difference.is_finite() { difference } else { Vec3::ZERO };
+        }
+        if let Some(octaves) = sample.kernel_octaves.filter(|o| o.is_finite()) {
+            self.slopes.resize(self.counts.len(), Default::default());
+            self.slopes[pixel][half].add(sample.radiance, octaves);
         }
         self.alpha[pixel] += sample.alpha.clamp(0.0, 1.0) as f64;
         add(&mut self.sums.emission, pixel, light(sample.emission));
@@ -181,6 +193,11 @@ impl Tile {
     /// estimate.
     pub(super) fn differences(&self, pixel: usize) -> Option<[Vec3; 2]> {
         self.differences.get(pixel).copied()
+    }
+
+    /// What the sizes of kernels tell of the halves of a pixel; `None` where nobody said them.
+    pub(super) fn slopes(&self, pixel: usize) -> Option<[Slope; 2]> {
+        self.slopes.get(pixel).copied()
     }
 
     /// Writes the value of a pass, which must be one the tile keeps, to `out` (as many floats as the pass

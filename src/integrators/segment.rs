@@ -4,7 +4,7 @@ use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::{Pass, Sample, SplatBuffer};
 use crate::math::Sampler;
 use crate::math::sampler::hash;
-use crate::transport::bridge::{BridgeSampler, Bridges};
+use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
@@ -29,17 +29,6 @@ const GRID_STREAM: u32 = 0x961d_0000;
 /// Keeps those of bridges apart.
 const BRIDGE_STREAM: u32 = 0xb21d_9e00;
 
-/// For every camera arrival, [`Primary::density`] if it is seen straight.
-fn seen_straight(primaries: &[Primary], s: Sampled) -> Vec<f32> {
-    let mut seen = vec![0.0; s.camera.arrivals.len()];
-    for p in primaries.iter().filter(|p| p.passages == 0) {
-        if let Some(a) = p.arrival {
-            seen[a as usize] = p.density;
-        }
-    }
-    seen
-}
-
 /// Segment-based light transport. Its stores are kept from one iteration to the next.
 #[derive(Debug, Default)]
 pub struct Segment {
@@ -53,6 +42,8 @@ pub struct Segment {
     reflected: Reflected,
     /// What every pixel sees, row by row.
     primaries: Vec<Primary>,
+    /// For every pixel, the size of the voxel in which it is filtered, octaves over the kernel's.
+    octaves: Vec<f32>,
     /// First arrival of every camera path that has one.
     starts: Vec<u32>,
     /// Whether light paths turned out to bring next to nothing, so that only a few are sampled, to look again.
@@ -116,35 +107,26 @@ impl Segment {
             return false;
         }
         costs.stage("areas", 0);
+        self.octaves.clear();
+        self.octaves.extend(self.primaries.iter().map(|p| match p.arrival {
+            Some(a) => grid.octaves(self.camera.arrivals[a as usize].position),
+            None => 0.0,
+        }));
         context.counters.segments.store(self.segments() as u64, Relaxed);
 
-        let joined = Sampled {
+        if let Some(choice) = self.techniques.bridges {
+            if !self.sample_bridges(context, index, choice, cut) {
+                return false;
+            }
+            costs.stage("bridges", self.bridges.bytes() + self.splats.bytes());
+        }
+        let sampled = Sampled {
             world,
             camera: &self.camera,
             light: &self.light,
             clusters: &self.clusters,
-            bridges: None,
+            bridges: self.techniques.bridges.map(|_| &self.bridges),
         };
-        let bridges = match self.techniques.bridges {
-            Some(choice) => {
-                let seed = context.seed ^ BRIDGE_STREAM;
-                let Context { sensor, filter, crop, max_depth, .. } = *context;
-                let sampler =
-                    BridgeSampler { sampled: joined, sensor, choice, seed, index, filter, crop, max_depth };
-                let mut rays = 0;
-                let is_done =
-                    self.bridges.sample(&sampler, seen_straight(&self.primaries, joined), &mut rays, cut);
-                context.counters.rays.fetch_add(rays, Relaxed);
-                if !is_done {
-                    return false;
-                }
-                self.splats.collect(&self.bridges.splats, filter, crop);
-                costs.stage("bridges", self.bridges.bytes() + self.splats.bytes());
-                Some(&self.bridges)
-            }
-            None => None,
-        };
-        let sampled = Sampled { bridges, ..joined };
         if !self.weights.weigh(sampled, self.techniques.estimator, cut) {
             return false;
         }
@@ -234,6 +216,26 @@ impl Segment {
         !cut.is_raised()
     }
 
+    /// Bridges between what was sampled and clustered, and what they send to the lens.
+    fn sample_bridges(&mut self, context: &Context, index: u32, choice: Choice, cut: &Cut) -> bool {
+        let Context { world, sensor, filter, crop, max_depth, .. } = *context;
+        let Self { camera, light, clusters, .. } = self;
+        let sampled = Sampled { world, camera, light, clusters, bridges: None };
+        let mut seen = vec![0.0; sampled.camera.arrivals.len()];
+        for p in self.primaries.iter().filter(|p| p.passages == 0) {
+            if let Some(a) = p.arrival {
+                seen[a as usize] = p.density;
+            }
+        }
+        let seed = context.seed ^ BRIDGE_STREAM;
+        let sampler = BridgeSampler { sampled, sensor, choice, seed, index, filter, crop, max_depth };
+        let mut rays = 0;
+        let is_done = self.bridges.sample(&sampler, seen, &mut rays, cut);
+        context.counters.rays.fetch_add(rays, Relaxed);
+        self.splats.collect(&self.bridges.splats, filter, crop);
+        is_done
+    }
+
     /// Segments of this iteration.
     fn segments(&self) -> usize {
         self.camera.segments(self.primaries.len()) + self.light.arrivals.len()
@@ -262,6 +264,7 @@ impl Segment {
             Sample {
                 radiance: p.light + p.weight * reflected + splatted.light,
                 unfiltered: self.techniques.camera_paths.then(|| p.light + p.weight * p.unfiltered),
+                kernel_octaves: Some(self.octaves[pixel]),
                 alpha: p.alpha,
                 emission: p.emission,
                 direct: p.mirrored + p.weight * direct.min(reflected) + splatted.direct,

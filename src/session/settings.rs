@@ -177,8 +177,9 @@ impl Json {
             return Err("settings: light_paths is 0, and this integrator cannot do without".into());
         }
         let has_bridges = self.integrator == Method::SegmentBridge;
-        if has_bridges && matches!(self.estimator, EstimatorName::Literal) {
-            return Err("settings: the literal recursion has no bridges".into());
+        let is_literal = matches!(self.estimator, EstimatorName::Literal);
+        if is_literal && (has_bridges || self.integrator == Method::SegmentPath) {
+            return Err("settings: this integrator has no literal estimator".into());
         }
         let alpha = within("kernel_alpha", self.kernel_alpha, 0.01, 0.99)?;
         let techniques = Techniques {

@@ -66,6 +66,11 @@ impl<'a> Grid<'a> {
         (size.floor() as i32).clamp(-MAX_LEVEL, MAX_LEVEL)
     }
 
+    /// Logarithm, in octaves, of the edge of the voxel at a point over the kernel's: zero on average over the jitter.
+    pub fn octaves(&self, p: Vec3) -> f32 {
+        self.level(p) as f32 - (self.edge * self.sensor.pixel_footprint(p)).log2()
+    }
+
     /// Lower corner and edge of a voxel.
     pub fn place(&self, voxel: &Voxel) -> (Vec3, f32) {
         let edge = edge(voxel.level);
