@@ -290,6 +290,10 @@ mod tests {
             (r#"{"resolution":[4,4],"samples":1,"light_paths":-1}"#, "light_paths"),
             (r#"{"resolution":[4,4],"samples":1,"light_paths":0,"integrator":"vcm"}"#, "light_paths"),
             (
+                r#"{"resolution":[4,4],"samples":1,"integrator":"segment-bridge","estimator":"literal"}"#,
+                "no literal estimator",
+            ),
+            (
                 r#"{"resolution":[4,4],"samples":1,"light_paths":0,"next_event":false,"camera_paths":false}"#,
                 "nothing is sampled",
             ),
