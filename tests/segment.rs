@@ -2,8 +2,7 @@
 
 mod common;
 
-use common::{PATH, Stage, icosphere};
-use glam::{DMat4, DVec3};
+use common::{PATH, POINT, RECT, Stage, WALL, corner_with_ball};
 use segue::film::Pass;
 
 /// The mean of a pass and its standard error, from 4 seeds.
@@ -20,28 +19,9 @@ fn segment(more: &str) -> String {
     format!(r#","integrator":"segment","kernel":"fixed","kernel_size":0.5{more}"#)
 }
 
-/// A corner of a room with coloured walls, open to the camera's side, and a ball in it.
-fn corner(ball: &str, wall: &str) -> Stage {
-    let mut s = Stage::default();
-    let wall = s.material(wall);
-    s.corner(wall);
-    let ball = s.material(ball);
-    let (points, triangles) = icosphere(3);
-    let mesh = s.mesh(&points, &triangles, Some(&points));
-    let at = DMat4::from_translation(DVec3::new(0.2, 0.1, 0.5)) * DMat4::from_scale(DVec3::splat(0.45));
-    s.place(mesh, ball, at);
-    s.camera(DVec3::new(0.6, -3.0, 1.3), DVec3::new(0.0, 0.0, 0.8), 0.4, "");
-    s
-}
-
-const WALL: &str = r#"{"surface":{"type":"diffuse","color":[0.7,0.6,0.5]}}"#;
-const RECT: &str = r#"{"type":"rect","width":0.6,"height":0.6,"radiance":[5,5,5],
-    "transform":[1,0,0,0,0,1,0,0,0,0,1,1.9,0,0,0,1]}"#;
 const DOME: &str = r#"{"type":"dome","radiance":[0.2,0.3,0.4]}"#;
 const DISTANT: &str = r#"{"type":"distant","irradiance":[1,1,1],"angle":3,
     "transform":[1,0,0,0,0,0.6,-0.8,0,0,0.8,0.6,0,0,0,0,1]}"#;
-const POINT: &str =
-    r#"{"type":"point","intensity":[0.5,0.5,0.5],"transform":[1,0,0,-0.5,0,1,0,-0.4,0,0,1,1.4,0,0,0,1]}"#;
 
 /// What finds the light of a rough scene by itself.
 const SETS: [(&str, &str); 6] = [
@@ -55,7 +35,7 @@ const SETS: [(&str, &str); 6] = [
 
 #[test]
 fn every_set_of_techniques_finds_the_light_of_a_diffuse_room() {
-    let mut s = corner(WALL, WALL);
+    let mut s = corner_with_ball(WALL, WALL, "");
     s.light(RECT);
     s.light(DOME);
     let reference = estimate(&s, 32, 256, Pass::Combined, PATH);
@@ -68,7 +48,7 @@ fn every_set_of_techniques_finds_the_light_of_a_diffuse_room() {
 /// several percent here: photons are few in every cluster.
 #[test]
 fn photons_do_not_count_themselves() {
-    let mut s = corner(WALL, WALL);
+    let mut s = corner_with_ball(WALL, WALL, "");
     s.light(RECT);
     let reference = estimate(&s, 32, 256, Pass::Indirect, PATH);
     for size in [1.0, 0.3] {
@@ -84,8 +64,11 @@ fn photons_do_not_count_themselves() {
 /// paths both estimators are the same, and with many photons in every cluster they meet.
 #[test]
 fn the_literal_recursion_has_the_bias_that_leaving_one_out_removes() {
-    let mut s =
-        corner(WALL, r#"{"surface":{"type":"principled","base_color":[0.7,0.6,0.5],"roughness":0.5}}"#);
+    let mut s = corner_with_ball(
+        WALL,
+        r#"{"surface":{"type":"principled","base_color":[0.7,0.6,0.5],"roughness":0.5}}"#,
+        "",
+    );
     s.light(RECT);
     let reference = estimate(&s, 32, 256, Pass::Indirect, PATH);
     let render = |size: f32, samples: u32, more: &str| {
@@ -127,7 +110,7 @@ fn glossy_and_layered_surfaces_agree() {
     let sheet = r#"{"surface":{"type":"add","a":{"type":"diffuse","color":0.4},
         "b":{"type":"translucent","color":0.4}}}"#;
     for (ball, wall) in [(layered, WALL), (glossy, layered), (frosted, WALL), (sheet, glossy)] {
-        let mut s = corner(ball, wall);
+        let mut s = corner_with_ball(ball, wall, "");
         s.light(RECT);
         s.light(DOME);
         let reference = estimate(&s, 24, 256, Pass::Combined, PATH);
@@ -142,7 +125,7 @@ fn glossy_and_layered_surfaces_agree() {
 /// side can use: losing those would be a bias that grows with the kernel.
 #[test]
 fn transmitting_surfaces_keep_their_light_under_large_kernels() {
-    let mut s = corner(r#"{"surface":{"type":"translucent","color":0.8}}"#, WALL);
+    let mut s = corner_with_ball(r#"{"surface":{"type":"translucent","color":0.8}}"#, WALL, "");
     s.light(RECT);
     let reference = estimate(&s, 48, 128, Pass::Combined, PATH);
     for (name, set) in &SETS[..2] {
@@ -154,7 +137,7 @@ fn transmitting_surfaces_keep_their_light_under_large_kernels() {
 #[test]
 fn delta_lights_and_the_sun_agree() {
     for light in [POINT, DISTANT, &DISTANT.replace(r#""angle":3"#, r#""angle":0"#)] {
-        let mut s = corner(WALL, WALL);
+        let mut s = corner_with_ball(WALL, WALL, "");
         s.light(light);
         let reference = estimate(&s, 32, 256, Pass::Combined, PATH);
         for (name, set) in [SETS[0], SETS[1], SETS[4], SETS[5]] {
@@ -168,7 +151,7 @@ fn delta_lights_and_the_sun_agree() {
 #[test]
 fn half_transparent_surfaces_catch_as_much_of_a_photon_as_of_other_light() {
     let half = r#"{"surface":{"type":"diffuse","color":0.7},"opacity":0.5}"#;
-    let mut s = corner(half, half);
+    let mut s = corner_with_ball(half, half, "");
     s.light(RECT);
     let reference = estimate(&s, 32, 256, Pass::Combined, PATH);
     for (name, set) in [SETS[0], SETS[1], SETS[4], SETS[5]] {
@@ -180,7 +163,7 @@ fn half_transparent_surfaces_catch_as_much_of_a_photon_as_of_other_light() {
 #[test]
 fn bounces_are_counted_as_in_path_tracing() {
     let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
-    let mut s = corner(glass, WALL);
+    let mut s = corner_with_ball(glass, WALL, "");
     let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
     s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
     for depth in [0, 1, 2, 3, 5] {
@@ -194,7 +177,7 @@ fn bounces_are_counted_as_in_path_tracing() {
 #[test]
 fn passes_split_the_light_as_path_tracing_does() {
     let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
-    let mut s = corner(glass, WALL);
+    let mut s = corner_with_ball(glass, WALL, "");
     s.light(DOME);
     let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
     s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
@@ -214,7 +197,7 @@ fn the_systematic_error_of_large_kernels_is_told() {
     let layered =
         r#"{"surface":{"type":"principled","base_color":[0.8,0.3,0.2],"roughness":0.4,"coat":0.5}}"#;
     for (ball, wall) in [(WALL, WALL), (frosted, layered), (clear, WALL)] {
-        let mut s = corner(ball, wall);
+        let mut s = corner_with_ball(ball, wall, "");
         s.light(RECT);
         s.light(DOME);
         for more in ["", r#","next_event":false"#, r#","max_depth":2"#] {
@@ -227,7 +210,7 @@ fn the_systematic_error_of_large_kernels_is_told() {
             assert!(fine < 2e-4 && coarse > 5e-4, "{ball}, {wall}{more}: {fine}, {coarse}");
         }
     }
-    let mut s = corner(WALL, WALL);
+    let mut s = corner_with_ball(WALL, WALL, "");
     s.light(RECT);
     assert_eq!(s.render(16, 4, PATH).film().estimated_error().and_then(|e| e.bias), None);
 }
@@ -235,7 +218,7 @@ fn the_systematic_error_of_large_kernels_is_told() {
 /// Whole paths and the recursion are two estimators of the same light, with other weights. Their samples are the same, so
 /// they differ by less than from the path tracer.
 fn assert_whole_paths_agree(what: &str, ball: &str, wall: &str, light: &str, sizes: &[f32], set: &str) {
-    let mut s = corner(ball, wall);
+    let mut s = corner_with_ball(ball, wall, "");
     s.light(light);
     let estimate = |samples, settings: &str| common::estimate(&s, (24, samples, 8), Pass::Combined, settings);
     let reference = estimate(192, PATH);
@@ -279,7 +262,7 @@ fn whole_paths_find_light_through_glass_and_of_points() {
 #[test]
 fn whole_paths_count_bounces_as_path_tracing_does() {
     let glass = r#"{"surface":{"type":"glass","ior":1.5}}"#;
-    let mut s = corner(glass, WALL);
+    let mut s = corner_with_ball(glass, WALL, "");
     let lamp = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
     s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [0.7, 0.7, 1.95], [0.7, -0.7, 1.95]], lamp);
     let whole = r#","integrator":"segment-path","kernel":"fixed","kernel_size":0.5"#;

@@ -1,13 +1,19 @@
 //! What the unit tests share.
 
+use super::Cut;
+use super::cluster::{Areas, Clusters, Numbered};
+use super::grid::Grid;
+use super::store::{CameraStore, LightStore};
 use crate::scene::mesh::MeshInput;
-use crate::scene::{InstanceGroup, SceneBuilder};
-use crate::shading::World;
+use crate::scene::{Camera, InstanceGroup, SceneBuilder};
+use crate::shading::{Sensor, World};
 use glam::Vec3;
 use std::sync::Arc;
 
-/// A camera for its grid.
-pub const CAMERA: &str = r#"{"window":[-1,1,-1,1]}"#;
+const CAMERA: &str = r#"{"window":[-1,1,-1,1]}"#;
+
+/// Never stopped.
+pub const ON: Cut = Cut(&|| false);
 
 /// A closed room of one material, with a pane of glass across it.
 pub fn room(wall: &str) -> World {
@@ -37,4 +43,14 @@ pub fn room(wall: &str) -> World {
     place(&pane, &outwards, r#"{"surface":{"type":"glass","ior":1.5}}"#);
     b.set_camera("camera", CAMERA).unwrap();
     World::new(Arc::new(b.build().unwrap()), false).unwrap()
+}
+
+/// Clusters of these arrivals in that room.
+pub fn clustered(world: &World, camera: &CameraStore, light: &LightStore, areas: Areas) -> Clusters {
+    let sensor = Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40);
+    let grid = Grid::new(&sensor, 4.0, 3);
+    let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
+    let mut clusters = Clusters::default();
+    assert!(clusters.group(world, &grid, all, &ON) && clusters.measure(world, &grid, all, areas, &ON));
+    clusters
 }

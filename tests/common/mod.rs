@@ -182,3 +182,26 @@ pub fn assert_close(what: &str, got: f64, expected: f64, tolerance: f64) {
     let error = (got / expected - 1.0).abs();
     assert!(error <= tolerance, "{what}: {got} instead of {expected}, off by {:.3} %", 100.0 * error);
 }
+
+/// A wall's material.
+pub const WALL: &str = r#"{"surface":{"type":"diffuse","color":[0.7,0.6,0.5]}}"#;
+/// A lamp below the ceiling.
+pub const RECT: &str = r#"{"type":"rect","width":0.6,"height":0.6,"radiance":[5,5,5],
+    "transform":[1,0,0,0,0,1,0,0,0,0,1,1.9,0,0,0,1]}"#;
+/// A point light.
+pub const POINT: &str =
+    r#"{"type":"point","intensity":[0.5,0.5,0.5],"transform":[1,0,0,-0.5,0,1,0,-0.4,0,0,1,1.4,0,0,0,1]}"#;
+
+/// A corner of a room, open to the camera's side, and a ball in it. `camera`: further JSON keys of the camera.
+pub fn corner_with_ball(ball: &str, wall: &str, camera: &str) -> Stage {
+    let mut s = Stage::default();
+    let wall = s.material(wall);
+    s.corner(wall);
+    let ball = s.material(ball);
+    let (points, triangles) = icosphere(3);
+    let mesh = s.mesh(&points, &triangles, Some(&points));
+    let at = DMat4::from_translation(DVec3::new(0.2, 0.1, 0.5)) * DMat4::from_scale(DVec3::splat(0.45));
+    s.place(mesh, ball, at);
+    s.camera(DVec3::new(0.6, -3.0, 1.3), DVec3::new(0.0, 0.0, 0.8), 0.4, camera);
+    s
+}

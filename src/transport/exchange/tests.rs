@@ -2,16 +2,14 @@
 
 use super::*;
 use crate::math::{Sampler, warp};
-use crate::scene::Camera;
 use crate::shading::bsdf::Walk;
-use crate::shading::{CameraRay, Piece, Sensor, World};
+use crate::shading::{CameraRay, Piece, World};
 use crate::transport::Estimator;
 use crate::transport::arrival::arrival;
-use crate::transport::cluster::{Areas, Clusters, Numbered};
-use crate::transport::grid::Grid;
+use crate::transport::cluster::Areas;
 use crate::transport::photons::photon_value;
 use crate::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing, Photon, Rivals};
-use crate::transport::testing::{CAMERA, room};
+use crate::transport::testing::{ON, clustered, room};
 use crate::transport::walk::{Follow, Nobody};
 
 /// Camera segments, and the same segments made by light paths: arrival `2 k` of the light's side stands where segment
@@ -81,17 +79,10 @@ fn the_weights_of_all_techniques_sum_to_one() {
     ] {
         let world = room(wall);
         let (camera, light) = both_ways(&world, 4000);
-        let sensor = Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40);
-        let grid = Grid::new(&sensor, 4.0, 3);
-        let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
-        let cut = Cut(&|| false);
-        let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
-        assert!(
-            clusters.group(&world, &grid, all, &cut)
-                && clusters.measure(&world, &grid, all, Areas::OfPhotons, &cut)
-        );
+        let (clusters, mut weights) =
+            (clustered(&world, &camera, &light, Areas::OfPhotons), Weights::default());
         let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
-        assert!(weights.weigh(s, Estimator::LeaveOneOut, &cut));
+        assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
         let constants = segments(s, &weights);
         let (mut checked, mut through_glass, mut shared) = (0, 0, 0);
         for i in (0..camera.arrivals.len()).step_by(2) {

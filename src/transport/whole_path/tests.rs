@@ -2,15 +2,13 @@
 
 use super::*;
 use crate::math::{Sampler, warp};
-use crate::scene::Camera;
 use crate::shading::bsdf::Walk;
-use crate::shading::{CameraRay, Piece, Sensor, Shaded, World};
+use crate::shading::{CameraRay, Piece, Shaded, World};
 use crate::transport::Estimator;
 use crate::transport::arrival::arrival;
-use crate::transport::cluster::{Areas, Clusters, Numbered};
-use crate::transport::grid::Grid;
+use crate::transport::cluster::Areas;
 use crate::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing, Photon};
-use crate::transport::testing::{CAMERA, room};
+use crate::transport::testing::{ON, clustered, room};
 use crate::transport::walk::{End, Follow, Nobody};
 
 /// Arrivals of a path; a light stands at the end of the segment that leaves the last.
@@ -141,17 +139,10 @@ fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Tec
             };
         }
     }
-    let sensor = Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40);
-    let grid = Grid::new(&sensor, 4.0, 3);
-    let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
-    let cut = Cut(&|| false);
-    let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
     // measured areas are a little different with every arrival that comes to a cluster
-    assert!(
-        clusters.group(world, &grid, all, &cut) && clusters.measure(world, &grid, all, Areas::None, &cut)
-    );
+    let (clusters, mut weights) = (clustered(world, &camera, &light, Areas::None), Weights::default());
     let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
-    assert!(weights.weigh(s, Estimator::WholePath, &cut));
+    assert!(weights.weigh(s, Estimator::WholePath, &ON));
     let segments = segments(s, &weights);
     let paths = WholePaths { s, w: &weights, segments: &segments, rests: rests(s, &weights) };
     let mut at = Prefix { throughput: Vec3::ONE, bounces: 0, is_first: true, back: 0.0 };
