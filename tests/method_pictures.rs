@@ -8,6 +8,7 @@ use glam::{DMat4, DVec3, Vec2, Vec3};
 use segue::math::Sampler;
 use segue::math::sampler::hash_unit;
 use segue::scene::Camera;
+use segue::shading::emitters::PLAIN;
 use segue::shading::{CameraRay, Sensor, World};
 use segue::transport::camera::{CameraSampler, Primary};
 use segue::transport::cluster::{Clusters, Numbered};
@@ -82,6 +83,7 @@ fn sampler<'a>(world: &'a World, sensor: &'a Sensor) -> CameraSampler<'a> {
     CameraSampler {
         world,
         sensor,
+        guide: &PLAIN,
         light_paths: 1.0,
         transparent_background: false,
         max_depth: None,
@@ -167,8 +169,13 @@ fn segment_graph() {
             canvas.line(project(eye), project(a.position), Vec3::new(0.45, 0.55, 0.85));
         }
     }
-    let lights =
-        LightSampler { world: &world, paths: 12.0, next_event: true, estimator: Estimator::LeaveOneOut };
+    let lights = LightSampler {
+        world: &world,
+        guide: &PLAIN,
+        paths: 12.0,
+        next_event: true,
+        estimator: Estimator::LeaveOneOut,
+    };
     (0..12).for_each(|k| lights.path(k, &mut Sampler::new(9, 0, k), &mut light, &mut 0));
     let lamp = (1.9 - EYE.z) as f32;
     for (i, a) in camera.arrivals.iter().enumerate() {

@@ -2,12 +2,13 @@
 
 use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::{Pass, Sample, SplatBuffer};
-use crate::math::Sampler;
 use crate::math::sampler::hash;
+use crate::math::{LUMINANCE, Sampler, luminance};
 use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
+use crate::transport::guiding::{Guiding, Start};
 use crate::transport::light::LightSampler;
 use crate::transport::propagate::Reflected;
 use crate::transport::store::{CameraStore, LightStore};
@@ -22,6 +23,8 @@ use std::sync::atomic::Ordering::Relaxed;
 const WORTHWHILE: f64 = 2e-3;
 /// Share of the light paths that is still sampled then.
 const IDLE: f32 = 1.0 / 16.0;
+/// Of the picture's mean brightness, what is added to that of a pixel where shares of it are judged.
+const DARK: f32 = 0.1;
 /// Keeps the random numbers of light paths apart from those of pixels.
 const LIGHT_STREAM: u32 = 0x11e4_7000;
 /// Keeps those of the grids apart from both.
@@ -40,6 +43,7 @@ pub struct Segment {
     splats: SplatBuffer,
     weights: Weights,
     reflected: Reflected,
+    guiding: Guiding,
     /// What every pixel sees, row by row.
     primaries: Vec<Primary>,
     /// For every pixel, the size of the voxel in which it is filtered, octaves over the kernel's.
@@ -67,6 +71,10 @@ impl Integrator for Segment {
             true => {
                 self.gather(context);
                 costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
+                if self.techniques.emission_guiding && Guiding::is_wanted(index, self.light.starts.len()) {
+                    self.learn(context, index, &cut);
+                    costs.stage("guiding", self.guiding.bytes());
+                }
                 IterationEnd::Complete
             }
         }
@@ -172,6 +180,7 @@ impl Segment {
         let sampler = CameraSampler {
             world: context.world,
             sensor: context.sensor,
+            guide: &self.guiding.guide,
             light_paths,
             transparent_background: context.transparent_background,
             max_depth: context.max_depth,
@@ -202,6 +211,7 @@ impl Segment {
     fn sample_light(&mut self, context: &Context, index: u32, paths: u32, cut: &Cut) -> bool {
         let sampler = LightSampler {
             world: context.world,
+            guide: &self.guiding.guide,
             paths: paths as f32,
             next_event: self.techniques.next_event,
             estimator: self.techniques.estimator,
@@ -234,6 +244,28 @@ impl Segment {
         context.counters.rays.fetch_add(rays, Relaxed);
         self.splats.collect(&self.bridges.splats, filter, crop);
         is_done
+    }
+
+    /// Learns from this iteration where light paths should begin, by what they bring as a share of what is shown.
+    fn learn(&mut self, context: &Context, index: u32, cut: &Cut) {
+        let Ok(shown) = context.film.read_pass(Pass::Combined, context.film.rect()) else { return };
+        let shown: Vec<f32> =
+            shown.chunks_exact(4).map(|c| luminance(Vec3::new(c[0], c[1], c[2])).max(0.0)).collect();
+        let mean = shown.iter().map(|&l| f64::from(l)).sum::<f64>() / shown.len() as f64;
+        let floor = DARK * mean as f32;
+        let starts = self.primaries.iter().zip(&shown).filter_map(|(p, l)| {
+            let worth = p.weight * (LUMINANCE / (l + floor));
+            Some(Start { arrival: p.arrival?, worth: if worth.is_finite() { worth } else { Vec3::ZERO } })
+        });
+        let starts: Vec<Start> = starts.collect();
+        let sampled = Sampled {
+            world: context.world,
+            camera: &self.camera,
+            light: &self.light,
+            clusters: &self.clusters,
+            bridges: self.techniques.bridges.map(|_| &self.bridges),
+        };
+        self.guiding.learn(sampled, &self.weights, &starts, index, cut);
     }
 
     /// Segments of this iteration.

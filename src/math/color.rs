@@ -2,10 +2,13 @@
 
 use glam::Vec3;
 
+/// Relative luminance of the primaries of linear Rec.709.
+pub const LUMINANCE: Vec3 = Vec3::new(0.212_671, 0.715_16, 0.072_169);
+
 /// Relative luminance of a linear Rec.709 colour.
 #[inline]
 pub fn luminance(c: Vec3) -> f32 {
-    c.dot(Vec3::new(0.212_671, 0.715_16, 0.072_169))
+    c.dot(LUMINANCE)
 }
 
 /// Decodes one sRGB-encoded component to linear light (IEC 61966-2-1). Values outside `[0,1]` follow

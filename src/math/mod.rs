@@ -7,7 +7,7 @@ pub mod frame;
 pub mod sampler;
 pub mod warp;
 
-pub use color::luminance;
+pub use color::{LUMINANCE, luminance};
 pub use frame::Frame;
 pub use sampler::Sampler;
 

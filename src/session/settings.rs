@@ -121,6 +121,7 @@ struct Json {
     kernel_alpha: f32,
     light_paths: f32,
     next_event: bool,
+    emission_guiding: bool,
     camera_paths: bool,
     resolution: [u32; 2],
     crop: Option<[u32; 4]>,
@@ -149,6 +150,7 @@ impl Default for Json {
             kernel_alpha: DEFAULT_ALPHA,
             light_paths: techniques.light_paths,
             next_event: techniques.next_event,
+            emission_guiding: techniques.emission_guiding,
             camera_paths: techniques.camera_paths,
             resolution: [0, 0],
             crop: None,
@@ -196,6 +198,7 @@ impl Json {
             },
             light_paths: within("light_paths", self.light_paths, 0.0, 64.0)?,
             next_event: self.next_event,
+            emission_guiding: self.emission_guiding,
             camera_paths: self.camera_paths,
             bridges: has_bridges.then_some(match self.bridges {
                 BridgeName::Uniform => Choice::Uniform,

@@ -1,12 +1,12 @@
 //! The first rays of light paths, and how dense they are beside the other ways to find the same light.
 
-use super::emitters::{Emission, EmitterHit, Receiver};
+use super::emitters::{Draw, Emission, EmissionGuide, EmitterHit, Lesson, Receiver};
 use super::ray::{LightPoint, LightSample, Piece};
 use super::surface::{normalize_any, place};
 use super::texture::MeshPoint;
 use super::world::World;
 use crate::accel::Ray;
-use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
+use crate::math::density::{AreaPdf, DiscreteProbability, EtenduePdf, SolidAnglePdf};
 use glam::{Vec2, Vec2Swizzles, Vec3};
 
 /// The first ray of a light path.
@@ -18,6 +18,8 @@ pub struct LightRay {
     pub flux: Vec3,
     /// How likely it was, the choice of emitter included.
     pub density: SourceDensity,
+    /// What it was drawn from.
+    pub draw: Draw,
     /// Where it left the emitter.
     hit: EmitterHit,
 }
@@ -34,11 +36,19 @@ pub enum SourceDensity {
 }
 
 impl World {
-    /// Draws the first ray of a light path, by power. `u`: a uniform number for the emitter, two for the
-    /// place and two for the direction.
-    pub fn sample_emission(&self, u: f32, place_u: Vec2, direction_u: Vec2) -> Option<LightRay> {
-        let (id, chosen, _) = self.emitters.select_emission(u)?;
-        let s = self.emitters.sample_from(id, place_u, direction_u)?;
+    /// Draws the first ray of a light path, by power and by what the guide has learnt. `u`: a uniform number for
+    /// the emitter, two for the place and two for the direction.
+    pub fn sample_emission(
+        &self,
+        guide: &EmissionGuide,
+        u: f32,
+        place_u: Vec2,
+        direction_u: Vec2,
+    ) -> Option<LightRay> {
+        let draw = guide.draw(&self.emitters, u, place_u, direction_u)?;
+        let (id, [x, y, z, w]) = (draw.emitter, draw.at);
+        let chosen = DiscreteProbability(self.emitters.emission_probability(id).0 * guide.relative(&draw));
+        let s = self.emitters.sample_from(id, Vec2::new(x, y), Vec2::new(z, w))?;
         let (mut ray, mut emission, mut point) = (Ray::new(s.origin, s.direction), s.emission, s.origin);
         if let (Some(b), Some((instance, triangle))) = (s.barycentrics, self.emitters.triangle_of(id)) {
             let mesh = self.scene.group(instance).mesh;
@@ -64,19 +74,19 @@ impl World {
             radiance: Vec3::ZERO,
         };
         let sound = flux.is_finite() && flux.max_element() > 0.0;
-        sound.then_some(LightRay { piece: Piece::along(ray, s.direction), flux, density, hit })
+        sound.then_some(LightRay { piece: Piece::along(ray, s.direction), flux, density, draw, hit })
     }
 
     /// Density of the light paths that leave towards where this light was met from.
-    pub fn emission_pdf(&self, light: &LightPoint) -> EtenduePdf {
-        let chosen = self.emitters.emission_probability(light.hit.emitter);
+    pub fn emission_pdf(&self, guide: &EmissionGuide, light: &LightPoint) -> EtenduePdf {
+        let chosen = self.emission_probability(guide, -light.direction, &light.hit);
         self.emitters.pdf_from(light.direction, &light.hit) * chosen
     }
 
     /// Density of the light paths that leave a sampled point of a light towards the receiver: per étendue; of
     /// a delta light, per area across the light's direction.
-    pub fn emission_pdf_of_sample(&self, light: &LightSample) -> f32 {
-        let chosen = self.emitters.emission_probability(light.hit.emitter).0;
+    pub fn emission_pdf_of_sample(&self, guide: &EmissionGuide, light: &LightSample) -> f32 {
+        let chosen = self.emission_probability(guide, -light.direction, &light.hit).0;
         match light.is_delta {
             true => {
                 let LightSample { hit, direction, .. } = light;
@@ -84,6 +94,29 @@ impl World {
             }
             false => chosen * self.emitters.pdf_from(light.direction, &light.hit).0,
         }
+    }
+
+    /// Factor on an emitter's density of the rays that leave it along `direction` where `hit` says: the probability
+    /// of choosing it, and how much the guide favours the ray.
+    fn emission_probability(
+        &self,
+        guide: &EmissionGuide,
+        direction: Vec3,
+        hit: &EmitterHit,
+    ) -> DiscreteProbability {
+        let chosen = self.emitters.emission_probability(hit.emitter);
+        match guide.is_empty() {
+            true => chosen,
+            false => {
+                let relative = guide.relative(&self.emitters.draw_of(direction, hit));
+                DiscreteProbability(chosen.0 * relative)
+            }
+        }
+    }
+
+    /// A guide that has learnt from light paths of this scene.
+    pub fn emission_guide(&self, lessons: Vec<Lesson>) -> EmissionGuide {
+        EmissionGuide::learn(&self.emitters, lessons)
     }
 
     /// Density with which [`World::sample_light`] finds the light of an unobstructed light ray at a receiver:

@@ -323,7 +323,7 @@ impl World {
             return;
         }
         let direction = piece.direction;
-        self.emitters.for_each_infinite(direction, |hit| {
+        self.emitters.for_each_infinite(piece.ray.origin, direction, |hit| {
             if !from_camera || self.emitters.camera_visible(hit.emitter) {
                 found(LightPoint { radiance: hit.radiance, direction, hit });
             }

@@ -7,7 +7,7 @@ use super::walk::{Chain, End, Follow, Witness};
 use crate::film::FirstHit;
 use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
-use crate::shading::emitters::Receiver;
+use crate::shading::emitters::{EmissionGuide, Receiver};
 use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
 use glam::Vec3;
 
@@ -60,6 +60,8 @@ pub struct CameraSampler<'a> {
     pub world: &'a World,
     /// The camera.
     pub sensor: &'a Sensor,
+    /// Where light paths begin.
+    pub guide: &'a EmissionGuide,
     /// Light paths of this iteration: their densities enter those of the camera's segments.
     pub light_paths: f32,
     /// Whether what lies behind everything is transparent.
@@ -132,6 +134,7 @@ struct Meeting<'a> {
     cos: f32,
     /// `1 / n^2` where it begins.
     inverse_n2: f32,
+    guide: &'a EmissionGuide,
     /// Light paths times the probability that one ends at the arrival.
     light_paths: f32,
     next_event: bool,
@@ -162,7 +165,10 @@ impl Witness for Meeting<'_> {
             0 if self.next_event => self.world.pdf_of_sampling(&self.receiver, light) / self.cos,
             _ => 0.0,
         };
-        let emission_pdf = if self.light_paths > 0.0 { self.world.emission_pdf(light).0 } else { 0.0 };
+        let emission_pdf = match self.light_paths > 0.0 {
+            true => self.world.emission_pdf(self.guide, light).0,
+            false => 0.0,
+        };
         self.add(chain, light.radiance, next_event_pdf, emission_pdf);
     }
 
@@ -237,6 +243,7 @@ impl CameraSampler<'_> {
                 receiver,
                 cos: end.hit.place.normal.dot(direction).abs(),
                 inverse_n2: start_n2,
+                guide: self.guide,
                 light_paths: self.light_paths * light_end,
                 next_event: self.next_event,
             };
@@ -293,7 +300,7 @@ impl CameraSampler<'_> {
         let paths = match self.light_paths > 0.0 {
             true => {
                 let ends = end.probability_from(self.world, light.direction);
-                self.light_paths * ends * self.world.emission_pdf_of_sample(&light)
+                self.light_paths * ends * self.world.emission_pdf_of_sample(self.guide, &light)
             }
             false => 0.0,
         };

@@ -39,6 +39,20 @@ impl Segment {
         }
     }
 
+    /// Factor on what it brings that makes it the own path's estimate of what arrival `i`, which it leaves, reflects.
+    pub fn along_path(&self, s: Sampled, w: &Weights, i: usize) -> Vec3 {
+        let cluster = s.clusters.of[i] as usize;
+        let c = &s.clusters.clusters[cluster];
+        let f = match c.class {
+            SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * s.camera.outgoing[i].pdf,
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+                let row = (s.clusters.place[i] - c.first) as usize;
+                w.row(cluster, row)[row]
+            }
+        };
+        f * (self.continuation / c.area)
+    }
+
     /// Densities of all techniques: `p_light` and `chance` of its end's cluster.
     pub fn density(&self, p_light: f32, chance: f32) -> f32 {
         self.camera + self.light * p_light.max(0.0) + self.bridge * chance

@@ -2,10 +2,11 @@
 
 use super::Estimator;
 use super::arrival::arrival;
-use super::store::{Carry, LightStore, Photon, Rivals};
+use super::store::{Carry, LightStart, LightStore, Photon, Rivals};
 use super::walk::{Chain, End, Follow, Nobody};
 use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
+use crate::shading::emitters::EmissionGuide;
 use crate::shading::{LightRay, Piece, SourceDensity, SurfaceClass, World};
 use glam::Vec3;
 
@@ -13,6 +14,8 @@ use glam::Vec3;
 pub struct LightSampler<'a> {
     /// The scene.
     pub world: &'a World,
+    /// Where light paths should begin.
+    pub guide: &'a EmissionGuide,
     /// Light paths of this iteration.
     pub paths: f32,
     /// Whether camera arrivals sample next-event segments.
@@ -25,7 +28,7 @@ impl LightSampler<'_> {
     /// Samples path number `path` into the store. Adds the rays it takes to `rays`.
     pub fn path(&self, path: u32, sampler: &mut Sampler, store: &mut LightStore, rays: &mut u64) {
         let (u, place, direction) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
-        let Some(ray) = self.world.sample_emission(u, place, direction) else { return };
+        let Some(ray) = self.world.sample_emission(self.guide, u, place, direction) else { return };
         let follow = Follow { world: self.world, walk: Walk::Light, from_camera: false };
         let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
         let Some(mut end) = end else { return };
@@ -34,6 +37,10 @@ impl LightSampler<'_> {
         let mut camera_choices = chain.reverse;
         let mut bounces = chain.passages;
         let mut carry = Carry { throughput: chain.throughput, inverse_n2: 1.0 / (chain.index * chain.index) };
+        let start = LightStart { draw: ray.draw, first: store.arrivals.len() as u32 };
+        if flux.is_finite() && flux.max_element() > 0.0 {
+            store.starts.push(start);
+        }
         while flux.is_finite() && flux.max_element() > 0.0 {
             let mut arrived = arrival(self.world, &end);
             let u = sampler.next_3d();

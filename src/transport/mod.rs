@@ -9,6 +9,7 @@ pub mod cluster;
 pub mod depth;
 mod exchange;
 pub mod grid;
+pub mod guiding;
 pub mod kernel;
 pub mod light;
 mod literal;
@@ -62,6 +63,8 @@ pub struct Techniques {
     pub camera_paths: bool,
     /// Bridge segments, if any, by how their light arrivals are chosen.
     pub bridges: Option<bridge::Choice>,
+    /// Whether light paths learn where to begin.
+    pub emission_guiding: bool,
 }
 
 impl Techniques {
@@ -80,6 +83,7 @@ impl Default for Techniques {
             next_event: true,
             camera_paths: true,
             bridges: None,
+            emission_guiding: true,
         }
     }
 }

@@ -10,7 +10,6 @@ use super::exchange::{GRAIN, Segment, emitted, gather, has_end, per_index, segme
 use super::photons::{FromPhotons, gather_photons, photon_values, towards_camera};
 use super::weigh::{Sampled, Weights};
 use crate::math::luminance;
-use crate::shading::SurfaceClass;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -113,16 +112,7 @@ impl Reflected {
                     let segment = &self.segments[i];
                     let end = has_end(s, i).then(|| (tails[i + 1 - first], self.photons[i + 1].brought));
                     let brought = segment.value(segment.emitted, end);
-                    let cluster = s.clusters.of[i] as usize;
-                    let c = &s.clusters.clusters[cluster];
-                    let f = match c.class {
-                        SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * s.camera.outgoing[i].pdf,
-                        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                            let row = place - c.first as usize;
-                            w.row(cluster, row)[row]
-                        }
-                    };
-                    light += f * brought * (segment.continuation / c.area);
+                    light += brought * segment.along_path(s, w, i);
                 }
                 tails[i - first] = light;
             }

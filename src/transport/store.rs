@@ -6,6 +6,7 @@
 //! is basic radiance `L / n^2`, with the camera in a medium of index one.
 
 use crate::shading::bsdf::Bsdf;
+use crate::shading::emitters::Draw;
 use crate::shading::{Address, SurfaceClass, World};
 use glam::Vec3;
 
@@ -97,6 +98,15 @@ pub struct EmissionHit {
     pub passages: u32,
 }
 
+/// A light path that arrived somewhere.
+#[derive(Clone, Copy, Debug)]
+pub struct LightStart {
+    /// What its first ray was drawn from.
+    pub draw: Draw,
+    /// The first of its arrivals, which follow each other.
+    pub first: u32,
+}
+
 /// What an arrival of a light path carries.
 #[derive(Clone, Copy, Debug)]
 pub struct Photon {
@@ -163,14 +173,16 @@ pub struct CameraStore {
     pub dropped: u64,
 }
 
-/// The lights' side of an iteration. All have one element for every arrival, but for `carries`.
+/// The lights' side of an iteration.
 #[derive(Debug, Default)]
 pub struct LightStore {
     /// Ends of segments, path by path.
     pub arrivals: Vec<Arrival>,
     /// What they carry.
     pub photons: Vec<Photon>,
-    /// Empty unless the literal recursion asked for it.
+    /// One for every path that arrived somewhere.
+    pub starts: Vec<LightStart>,
+    /// One for every arrival; empty unless the literal recursion asked for it.
     pub carries: Vec<Carry>,
 }
 
@@ -221,13 +233,15 @@ impl CameraStore {
 impl LightStore {
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        bytes(&self.arrivals) + bytes(&self.photons) + bytes(&self.carries)
+        bytes(&self.arrivals) + bytes(&self.photons) + bytes(&self.starts) + bytes(&self.carries)
     }
 
     /// Appends the paths of another store.
     pub fn append(&mut self, other: &mut Self) {
+        let first = self.arrivals.len() as u32;
         self.arrivals.append(&mut other.arrivals);
         self.photons.append(&mut other.photons);
+        self.starts.extend(other.starts.drain(..).map(|s| LightStart { first: s.first + first, ..s }));
         self.carries.append(&mut other.carries);
     }
 
@@ -235,6 +249,7 @@ impl LightStore {
     pub fn clear(&mut self) {
         self.arrivals.clear();
         self.photons.clear();
+        self.starts.clear();
         self.carries.clear();
     }
 }

@@ -111,7 +111,7 @@ fn directions_towards(what: &str, e: &Emitters, r: Receiver) {
             }
         };
         e.for_each_hit(r.position, w, f32::INFINITY, &mut add);
-        e.for_each_infinite(w, &mut add);
+        e.for_each_infinite(Vec3::ZERO, w, &mut add);
         sum
     };
     check(&format!("towards {what}"), sample, pdf);

@@ -127,7 +127,7 @@ fn a_sun_of_a_thousandth_of_a_degree() {
             assert_eq!(hit.radiance, radiance);
             assert_eq!(e.pdf_towards(&r, s.direction, &hit), pdf);
         };
-        e.for_each_infinite(s.direction, &mut met);
+        e.for_each_infinite(Vec3::ZERO, s.direction, &mut met);
     }
     // directions have 24 bits: those at the rim may round out of the disk
     assert!(seen > 9_700, "{seen} of 10000 samples see the sun");
@@ -162,7 +162,7 @@ fn images_of_odd_sizes_and_black_ones() {
         let uniform = Estimate::new(20_000, |i| {
             let mut sum = 0.0;
             let w = segue::math::warp::uniform_sphere(pair(i, 1));
-            e.for_each_infinite(w, |hit| sum += hit.radiance.x as f64);
+            e.for_each_infinite(Vec3::ZERO, w, |hit| sum += hit.radiance.x as f64);
             sum * 4.0 * PI
         });
         by_image.assert_agrees(uniform, 1e-4, &format!("{w} x {h}"));
@@ -184,7 +184,7 @@ fn dome_images_are_oriented_as_documented() {
         let map = image(8, 5, |i, j| [if (i, j) == (x, y) { 1.0 } else { 0.0 }; 3]);
         let e = emitters_of(&[r#"{"type":"dome","radiance":[1,1,1],"image":0}"#], &[], &[map]);
         let mut l = 0.0;
-        e.for_each_infinite(w, |hit| l = hit.radiance.x);
+        e.for_each_infinite(Vec3::ZERO, w, |hit| l = hit.radiance.x);
         l
     };
     assert!(seen(4, 0, Vec3::new(0.0, 1.0, 0.1).normalize()) > 0.4);
@@ -196,7 +196,7 @@ fn dome_images_are_oriented_as_documented() {
         r#"{"type":"dome","radiance":[1,1,1],"image":0,"transform":[-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}"#;
     let e = emitters_of(&[json], &[], &[map]);
     let mut l = 0.0;
-    e.for_each_infinite(Vec3::NEG_X, |hit| l = hit.radiance.x);
+    e.for_each_infinite(Vec3::ZERO, Vec3::NEG_X, |hit| l = hit.radiance.x);
     assert!(l > 0.4);
 }
 

@@ -25,7 +25,7 @@ fn next_event(e: &Emitters, r: &Receiver) -> Estimate {
 /// Calls `f` for all that a ray from the receiver meets.
 fn trace(e: &Emitters, x: Vec3, w: Vec3, triangles: &[MeshTriangle], mut f: impl FnMut(EmitterHit)) {
     e.for_each_hit(x, w, f32::INFINITY, &mut f);
-    e.for_each_infinite(w, &mut f);
+    e.for_each_infinite(Vec3::ZERO, w, &mut f);
     for t in triangles {
         let [a, b, c] = t.vertices;
         let n = (b - a).cross(c - a);

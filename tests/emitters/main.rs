@@ -3,6 +3,7 @@
 
 mod chi_square;
 mod extremes;
+mod guiding;
 mod irradiance;
 mod references;
 mod scene_data;

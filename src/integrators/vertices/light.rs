@@ -72,7 +72,7 @@ fn vertices(
 ) {
     let world = rules.world;
     let (u, place, direction) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
-    let Some(ray) = world.sample_emission(u, place, direction) else { return };
+    let Some(ray) = world.sample_emission(rules.guide, u, place, direction) else { return };
     let follow = Follow { world, walk: Walk::Light, from_camera: false };
     let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
     let Some(mut end) = end else { return };

@@ -4,7 +4,7 @@ use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::sample::{Emission, FromSample, SurfacePoint};
 use crate::math::density::{AreaPdf, EtenduePdf, ProjectedPdf, SolidAnglePdf};
-use crate::math::{Frame, luminance, warp};
+use crate::math::{Frame, ONE_MINUS_EPSILON, luminance, warp};
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -168,6 +168,26 @@ impl Cylinder {
             _ if normal.dot(direction) <= 0.0 => EtenduePdf(0.0),
             Some(f) => self.across_pdf(direction, f.pdf(direction)).unwrap_or(EtenduePdf(0.0)),
             None => EtenduePdf((FRAC_1_PI / self.area()) as f32),
+        }
+    }
+
+    /// The numbers from which [`Cylinder::from`] draws a ray.
+    pub fn square_of(&self, point: Vec3, normal: Vec3, direction: Vec3) -> [Vec2; 2] {
+        let (n, d) = (normal.as_dvec3(), direction.as_dvec3());
+        let along = (point.as_dvec3() - self.center).dot(self.axis) / self.half_length;
+        let half = |t: f64| (((t + 1.0) / 2.0) as f32).clamp(0.0, ONE_MINUS_EPSILON);
+        match &self.falloff {
+            None => {
+                let (s, t) = self.axis.any_orthonormal_pair();
+                let turn = warp::turn_of(n.dot(s) as f32, n.dot(t) as f32);
+                let local = Frame::from_normal(normal).to_local(direction);
+                [Vec2::new(turn, half(along)), warp::square_of_disk(local.truncate())]
+            }
+            Some(f) => {
+                let front = (d - self.axis * d.dot(self.axis)).normalize_or_zero();
+                let sin = self.axis.cross(front).dot(n);
+                [Vec2::new(half(sin), half(along)), f.square_of(direction)]
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
-use super::plane::{Plane, flat_integral, leave, leave_pdf};
+use super::plane::{Plane, flat_integral, leave, leave_pdf, leave_square};
 use super::sample::{FromSample, SurfacePoint};
 use super::spherical_rect::SphericalRect;
 use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
@@ -124,6 +124,12 @@ impl Disk {
     pub fn pdf_from(&self, direction: Vec3) -> EtenduePdf {
         let area = AreaPdf(1.0 / self.area as f32);
         area.with_direction(leave_pdf(self.plane.normal, self.falloff.as_ref(), direction))
+    }
+
+    /// The numbers from which [`Disk::from`] draws a ray.
+    pub fn square_of(&self, point: Vec3, direction: Vec3) -> [Vec2; 2] {
+        let place = warp::square_of_disk(self.plane.coordinates(point).as_vec2());
+        [place, leave_square(self.plane.normal, self.falloff.as_ref(), direction)]
     }
 
     pub fn power(&self) -> DVec3 {

@@ -95,6 +95,11 @@ impl Distant {
         EtenduePdf(self.pdf_towards(-direction).0 / bounds.disk_area())
     }
 
+    /// The numbers from which [`Distant::from`] draws the direction.
+    pub fn square_of(&self, direction: Vec3) -> Vec2 {
+        warp::square_of_cone(self.frame.to_local(-direction), self.one_minus_cos)
+    }
+
     /// Irradiance of a facing surface.
     pub fn irradiance(&self) -> Vec3 {
         self.irradiance

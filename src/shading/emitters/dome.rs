@@ -77,6 +77,14 @@ impl Dome {
         EtenduePdf(self.pdf(None, -direction) / bounds.disk_area())
     }
 
+    /// The numbers from which [`Dome::from`] draws the direction.
+    pub fn square_of(&self, direction: Vec3) -> Vec2 {
+        match &self.map {
+            Some(map) => map.square_of(image_of(self.to_local * -direction)),
+            None => warp::square_of_sphere(-direction),
+        }
+    }
+
     /// Radiance integrated over all directions.
     pub fn fluence(&self) -> DVec3 {
         let mean = self.radiance * self.map.as_ref().map_or(Vec3::ONE, MapSampler::mean);

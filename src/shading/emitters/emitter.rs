@@ -133,6 +133,30 @@ impl Emitter {
         }
     }
 
+    /// The numbers from which [`Emitter::sample_from`] draws the ray that travels along `direction` from where
+    /// `hit` says: those of its place, then those of its direction.
+    pub fn square_of(&self, bounds: &SceneBounds, direction: Vec3, hit: &EmitterHit) -> [Vec2; 2] {
+        match self {
+            Self::Rect(l) => l.square_of(hit.point, direction),
+            Self::Disk(l) => l.square_of(hit.point, direction),
+            Self::Sphere(l) => l.square_of(hit.normal, direction),
+            Self::Cylinder(l) => l.square_of(hit.point, hit.normal, direction),
+            Self::Point(l) => [Vec2::ZERO, l.square_of(direction)],
+            Self::Distant(l) if l.is_delta() => [bounds.square_of(direction, hit.point), Vec2::ZERO],
+            Self::Distant(l) => [bounds.square_of(direction, hit.point), l.square_of(direction)],
+            Self::Dome(l) => [bounds.square_of(direction, hit.point), l.square_of(direction)],
+        }
+    }
+
+    /// Whether a ray's place and its direction are drawn at all.
+    pub fn draws(&self) -> [bool; 2] {
+        match self {
+            Self::Point(_) => [false, true],
+            Self::Distant(l) => [true, !l.is_delta()],
+            _ => [true, true],
+        }
+    }
+
     /// Of what no ray can meet: density of the light paths that travel along `direction`, per area of a
     /// surface that faces them at `distance`.
     pub fn pdf_of_rays(&self, bounds: &SceneBounds, direction: Vec3, distance: f32) -> AreaPdf {

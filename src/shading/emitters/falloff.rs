@@ -1,6 +1,6 @@
 //! Directional fall-off of emission around an axis, and its importance sampling.
 
-use crate::math::Frame;
+use crate::math::{Frame, ONE_MINUS_EPSILON, warp};
 use crate::scene::light::{Profile, Shaping};
 use glam::{Vec2, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -143,6 +143,29 @@ impl Falloff {
             true => 0.0,
             false => cosine_power_density(local.z as f64, self.power, self.power + 2.0, cutoff) as f32,
         }
+    }
+
+    /// The numbers from which [`Falloff::sample`] draws a direction.
+    pub fn square_of(&self, direction: Vec3) -> Vec2 {
+        if self.power > 0.0 || self.cutoff <= FRAC_PI_2 {
+            return self.square_of_power(direction, self.power + 1.0, self.cutoff);
+        }
+        let local = self.frame.to_local(direction);
+        warp::square_of_cone(local, one_minus_cos(self.cutoff) as f32)
+    }
+
+    /// The numbers from which [`Falloff::sample_flat`] draws a direction.
+    pub fn square_of_flat(&self, direction: Vec3) -> Vec2 {
+        self.square_of_power(direction, self.power + 2.0, self.cutoff.min(FRAC_PI_2))
+    }
+
+    fn square_of_power(&self, direction: Vec3, k: f64, cutoff: f64) -> Vec2 {
+        let local = self.frame.to_local(direction);
+        let sin2 = (local.x as f64).powi(2) + (local.y as f64).powi(2);
+        // 1 - cos^k, from the sine where that is exact
+        let within = if local.z > 0.0 { -(0.5 * k * (-sin2).ln_1p()).exp_m1() } else { 1.0 };
+        let u = (within / covered(k, cutoff)) as f32;
+        Vec2::new(u.clamp(0.0, ONE_MINUS_EPSILON), warp::turn_of(local.x, local.y))
     }
 
     /// Integral of the factor over all solid angles, sr.

@@ -216,6 +216,36 @@ impl MapSampler {
         t as f32
     }
 
+    /// The numbers from which [`MapSampler::sample`] draws a point.
+    pub fn square_of(&self, at: Vec2) -> Vec2 {
+        let mut x = ((at.x * self.width as f32) as usize).min(self.width - 1);
+        let mut y = ((at.y * self.height as f32) as usize).min(self.height - 1);
+        let mut u = Vec2::new(at.x * self.width as f32 - x as f32, self.part_of_row(y, at.y));
+        for level in 0..self.levels.len() {
+            let get = |x: usize, y: usize| match level {
+                0 => self.cell(x, y),
+                _ => self.levels[level - 1].get(x, y),
+            };
+            let ([x0, y0], odd) = ([x & !1, y & !1], [x & 1, y & 1]);
+            let row = |y: usize| get(x0, y) + get(x0 + 1, y);
+            u.x = unchoose(get(x0, y), get(x0 + 1, y), odd[0], u.x);
+            u.y = unchoose(row(y0), row(y0 + 1), odd[1], u.y);
+            (x, y) = (x / 2, y / 2);
+        }
+        u.clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON))
+    }
+
+    /// What [`MapSampler::row_point`] takes to a coordinate within row `y`.
+    fn part_of_row(&self, y: usize, at: f32) -> f32 {
+        let (a, b) = (y as f64 / self.height as f64, (y + 1) as f64 / self.height as f64);
+        let measure = |t: f64| match self.layout {
+            Layout::Flat => t,
+            Layout::LatLong if t > 0.5 => 1.0 - ((1.0 - t) * PI / 2.0).sin().powi(2),
+            Layout::LatLong => (t * PI / 2.0).sin().powi(2),
+        };
+        (((measure(at as f64) - measure(a)) / (measure(b) - measure(a))) as f32).clamp(0.0, 1.0)
+    }
+
     /// Density of [`MapSampler::sample`] per unit of the layout's measure.
     pub fn pdf(&self, at: Vec2) -> f32 {
         let x = ((at.x * self.width as f32) as usize).min(self.width - 1);
@@ -260,5 +290,15 @@ fn choose(a: f32, b: f32, u: f32) -> Option<(usize, f32)> {
         _ if a + b <= 0.0 => None,
         true => Some((0, (u / p).min(ONE_MINUS_EPSILON))),
         false => Some((1, ((u - p) / (1.0 - p)).min(ONE_MINUS_EPSILON))),
+    }
+}
+
+/// The number from which [`choose`] made this choice and left `rest`.
+fn unchoose(a: f32, b: f32, choice: usize, rest: f32) -> f32 {
+    let p = a / (a + b);
+    match choice {
+        _ if a + b <= 0.0 => rest,
+        0 => rest * p,
+        _ => p + rest * (1.0 - p),
     }
 }

@@ -9,6 +9,7 @@ mod distant;
 mod dome;
 mod emitter;
 mod falloff;
+mod guide;
 mod hit_tree;
 mod light_tree;
 mod map_sampler;
@@ -32,10 +33,12 @@ use emitter::{Emitter, luminance64};
 use glam::{DVec3, Vec2, Vec3};
 use hit_tree::HitTree;
 use selection::Selector;
+use std::ops::Range;
 use std::sync::Arc;
 use triangle::Triangle;
 use triangle_table::TriangleTable;
 
+pub use guide::{Draw, EmissionGuide, Lesson, PLAIN};
 pub use sample::{Emission, EmitterHit, EmitterId, FromSample, Incident, Receiver, TowardsSample};
 pub use scene_bounds::SceneBounds;
 pub use triangle::MeshTriangle;
@@ -51,6 +54,8 @@ pub struct Emitters {
     hittable: HitTree,
     selector: Selector,
     by_power: Option<AliasTable>,
+    /// Share of the power that the emitters before each one have together, and all.
+    power_before: Vec<f64>,
     total_power: Vec3,
     bounds: SceneBounds,
 }
@@ -90,6 +95,7 @@ impl Emitters {
         let powers: Vec<DVec3> = lights.iter().map(power).chain(kept.iter().map(Triangle::power)).collect();
         let table = TriangleTable::new(&places, first);
         Ok(Self {
+            power_before: shares_before(&powers),
             by_power: AliasTable::new(powers.iter().map(|&p| luminance64(p))),
             total_power: powers.iter().sum::<DVec3>().as_vec3(),
             infinite: infinite.iter().map(|i| i.id).collect(),
@@ -222,13 +228,13 @@ impl Emitters {
         });
     }
 
-    /// Calls `found` for every dome and every distant light of some extent that is seen along the unit
-    /// vector `direction`.
-    pub fn for_each_infinite(&self, direction: Vec3, mut found: impl FnMut(EmitterHit)) {
+    /// Calls `found` for every dome and every distant light of some extent that is seen from `origin` along the
+    /// unit vector `direction`.
+    pub fn for_each_infinite(&self, origin: Vec3, direction: Vec3, mut found: impl FnMut(EmitterHit)) {
         for &id in &self.infinite {
             if let Some(radiance) = self.lights[id.0 as usize].seen(direction) {
                 let distance = f32::INFINITY;
-                found(EmitterHit { emitter: id, distance, point: Vec3::ZERO, normal: -direction, radiance });
+                found(EmitterHit { emitter: id, distance, point: origin, normal: -direction, radiance });
             }
         }
     }
@@ -250,10 +256,52 @@ impl Emitters {
         Some((EmitterId(index as u32), DiscreteProbability(p), u))
     }
 
+    /// Share of the power that the emitters before number `index` have.
+    fn power_before(&self, index: u32) -> f64 {
+        self.power_before[index as usize]
+    }
+
+    /// The emitter in whose part of the power this share of it lies.
+    fn at_power(&self, share: f64) -> u32 {
+        let behind = self.power_before.partition_point(|&p| p <= share);
+        behind.saturating_sub(1).min(self.len().saturating_sub(1)) as u32
+    }
+
+    /// Whether all of some emitters draw the place, and whether all draw the direction, of rays that leave them.
+    fn drawn(&self, range: Range<u32>) -> [bool; 2] {
+        let lights = &self.lights[(range.start as usize).min(self.lights.len())..];
+        let among = &lights[..lights.len().min(range.len())];
+        among.iter().map(Emitter::draws).fold([true; 2], |all, one| [all[0] && one[0], all[1] && one[1]])
+    }
+
+    /// What [`Emitters::sample_from`] draws the ray from that travels along `direction` and leaves an emitter where
+    /// `hit` says.
+    pub fn draw_of(&self, direction: Vec3, hit: &EmitterHit) -> Draw {
+        let [place, direction] = match self.get(hit.emitter) {
+            Kind::Light(l) => l.square_of(&self.bounds, direction, hit),
+            Kind::Triangle(t) => t.square_of(hit.point, direction),
+        };
+        Draw { emitter: hit.emitter, at: [place.x, place.y, direction.x, direction.y] }
+    }
+
     /// Probability with which [`Emitters::select_emission`] chooses an emitter.
     pub fn emission_probability(&self, id: EmitterId) -> DiscreteProbability {
         DiscreteProbability(self.by_power.as_ref().map_or(0.0, |t| t.probability(id.0 as usize)))
     }
+}
+
+/// Sums of the powers before each, and of all, as shares.
+fn shares_before(powers: &[DVec3]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut before: Vec<f64> = std::iter::once(0.0)
+        .chain(powers.iter().map(|&p| {
+            let power = luminance64(p);
+            sum += if power.is_finite() { power.max(0.0) } else { 0.0 };
+            sum
+        }))
+        .collect();
+    before.iter_mut().for_each(|b| *b /= sum.max(f64::MIN_POSITIVE));
+    before
 }
 
 enum Kind<'a> {

@@ -101,6 +101,14 @@ pub(super) fn leave_pdf(normal: Vec3, falloff: Option<&Falloff>, direction: Vec3
     })
 }
 
+/// The numbers from which [`leave`] draws a direction.
+pub(super) fn leave_square(normal: Vec3, falloff: Option<&Falloff>, direction: Vec3) -> Vec2 {
+    match falloff {
+        Some(f) => f.square_of_flat(direction),
+        None => warp::square_of_disk(Frame::from_normal(normal).to_local(direction).truncate()),
+    }
+}
+
 /// Integral of the fall-off over projected solid angle.
 pub(super) fn flat_integral(falloff: Option<&Falloff>) -> Vec3 {
     falloff.map_or(Vec3::splat(PI as f32), Falloff::integral_flat)

@@ -61,6 +61,14 @@ impl Point {
         })
     }
 
+    /// The numbers from which [`Point::from`] draws a direction.
+    pub fn square_of(&self, direction: Vec3) -> Vec2 {
+        match &self.falloff {
+            Some(f) => f.square_of(direction),
+            None => warp::square_of_sphere(direction),
+        }
+    }
+
     pub fn power(&self) -> DVec3 {
         let angles = self.falloff.as_ref().map_or(Vec3::splat(4.0 * PI), Falloff::integral);
         (self.intensity * angles).as_dvec3()

@@ -3,11 +3,11 @@
 use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::map_sampler::MapSampler;
-use super::plane::{Plane, flat_integral, leave, leave_pdf};
+use super::plane::{Plane, flat_integral, leave, leave_pdf, leave_square};
 use super::sample::{FromSample, SurfacePoint};
 use super::spherical_rect::SphericalRect;
 use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
-use crate::math::luminance;
+use crate::math::{ONE_MINUS_EPSILON, luminance};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// A parallelogram that emits from one side.
@@ -156,6 +156,13 @@ impl Rect {
 
     pub fn pdf_from(&self, point: Vec3, direction: Vec3) -> EtenduePdf {
         self.area_pdf(point).with_direction(leave_pdf(self.plane.normal, self.falloff.as_ref(), direction))
+    }
+
+    /// The numbers from which [`Rect::from`] draws a ray.
+    pub fn square_of(&self, point: Vec3, direction: Vec3) -> [Vec2; 2] {
+        let at = to_image(self.plane.coordinates(point)).clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON));
+        let place = self.map.as_ref().map_or(at, |m| m.square_of(at));
+        [place, leave_square(self.plane.normal, self.falloff.as_ref(), direction)]
     }
 
     pub fn power(&self) -> DVec3 {

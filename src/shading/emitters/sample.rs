@@ -124,7 +124,7 @@ pub struct EmitterHit {
     pub emitter: EmitterId,
     /// Distance along the ray; infinite for domes and distant lights.
     pub distance: f32,
-    /// The point met; unused where `distance` is infinite.
+    /// The point met; where `distance` is infinite, any point of the ray.
     pub point: Vec3,
     /// Unit normal of the emitting side there.
     pub normal: Vec3,

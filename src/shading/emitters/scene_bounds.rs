@@ -26,4 +26,10 @@ impl SceneBounds {
         let origin = self.center + Frame::from_normal(direction).to_world(disk);
         FromSample { origin, normal: direction, direction, emission, barycentrics: None }
     }
+
+    /// The numbers from which [`SceneBounds::enter`] draws the ray along `direction` through a point.
+    pub(super) fn square_of(&self, direction: Vec3, point: Vec3) -> Vec2 {
+        let local = Frame::from_normal(direction).to_local(point - self.center);
+        warp::square_of_disk(local.truncate() / self.radius)
+    }
 }

@@ -124,6 +124,15 @@ impl Sphere {
         }
     }
 
+    /// The numbers from which [`Sphere::from`] draws a ray.
+    pub fn square_of(&self, normal: Vec3, direction: Vec3) -> [Vec2; 2] {
+        let across = |n: Vec3, v: Vec3| warp::square_of_disk(Frame::from_normal(n).to_local(v).truncate());
+        match &self.falloff {
+            None => [warp::square_of_sphere(normal), across(normal, direction)],
+            Some(f) => [across(direction, normal), f.square_of(direction)],
+        }
+    }
+
     pub fn power(&self) -> DVec3 {
         let angles = self.falloff.as_ref().map_or(Vec3::splat(4.0 * PI), Falloff::integral);
         (self.radiance * angles).as_dvec3() * (TAU / 2.0 * self.radius * self.radius)

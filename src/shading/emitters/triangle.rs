@@ -148,6 +148,18 @@ impl Triangle {
         AreaPdf(1.0 / area).with_direction(ProjectedPdf(pdf))
     }
 
+    /// The numbers from which [`Triangle::from`] draws a ray.
+    pub fn square_of(&self, point: Vec3, direction: Vec3) -> [Vec2; 2] {
+        let (normal, _) = self.geometry();
+        let is_back = self.two_sided && normal.dot(direction) < 0.0;
+        let mut u = warp::square_of_triangle(self.barycentrics(point + normal, -normal.as_dvec3()));
+        if self.two_sided {
+            u.x = 0.5 * if is_back { u.x } else { 1.0 + u.x };
+        }
+        let side = if is_back { -normal } else { normal };
+        [u, warp::square_of_disk(Frame::from_normal(side).to_local(direction).truncate())]
+    }
+
     pub fn power(&self) -> DVec3 {
         let sides = if self.two_sided { 2.0 } else { 1.0 };
         self.radiance.as_dvec3() * (PI * sides * self.geometry().1 as f64)
