@@ -10,7 +10,7 @@ LIBRARY := build/libsegue.so
 VENV := .venv
 PIP_FLAGS := --quiet --disable-pip-version-check
 
-.PHONY: all library render test lint test-rust test-c test-python test-blender-current test-blender \
+.PHONY: all library render test lint test-rust test-c test-python test-blender-current test-blender stress \
         blender-extension bench clean
 
 all: library $(VENV)/ready
@@ -56,6 +56,11 @@ test-c: library
 
 test-python: all
 	$(VENV)/bin/pytest -q tests/python
+	$(VENV)/bin/pytest -q tests/stability
+
+# The stability suite in full, and its report docs/stability.md.
+stress: all
+	$(VENV)/bin/python tests/stability/report.py
 
 test-blender-current: all
 	$(VENV)/bin/python tests/blender/run_versions.py 5.0

@@ -128,7 +128,7 @@ def gallery(seeds: int = 8, samples: int = 192) -> None:
                 render(scene, seed=1000 * seed, **common, **settings)[0]
                 for seed in range(seeds)
             )
-            return np.array([picture.mean() for picture in pictures])
+            return np.array([picture.mean(dtype=float) for picture in pictures])
 
         expected = means(small)
         for what, settings in kernels.items():

@@ -22,7 +22,7 @@ pub struct Path;
 const ROULETTE_FROM: u32 = 3;
 /// From here on even a path that loses nothing may end, so that a closed white scene does too.
 const ROULETTE_ALWAYS_FROM: u32 = 64;
-const MAX_SURVIVAL: f32 = 0.99;
+const MAX_SURVIVAL: f32 = 0.9995;
 
 impl Integrator for Path {
     fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd {

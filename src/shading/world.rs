@@ -47,7 +47,13 @@ pub struct World {
     needs: Needs,
     warnings: Warnings,
     costs: Vec<BuildCost>,
+    most_survival: f32,
 }
+
+/// Vertices of a path between white walls, on average, where a picture has many pixels, and at most.
+const PATH_LENGTHS: [f32; 2] = [50.0, 2000.0];
+/// Such vertices of all paths of an iteration together, where they may be longer.
+const PATH_VERTICES: f32 = (1 << 23) as f32;
 
 /// A surface point, shaded.
 #[derive(Clone, Debug)]
@@ -131,7 +137,23 @@ impl World {
             warnings.add("scene", "nothing emits light: the picture will be black", 1);
         }
         let classes = scene.materials.iter().map(SurfaceClass::of).collect();
-        Ok(Self { scene, accel, materials, emitters, classes, needs, warnings, costs })
+        let most_survival = survival_for(PATH_LENGTHS[0]);
+        Ok(Self { scene, accel, materials, emitters, classes, needs, warnings, costs, most_survival })
+    }
+
+    /// For pictures of so many pixels, all of whose paths are kept at a time: the fewer, the longer they may be. Roulette
+    /// that ends a path more often than surfaces absorb makes the noise of closed rooms grow with every bounce, and
+    /// without bound where `albedo² > survival`.
+    pub fn with_paths_for(self, pixels: u64) -> Self {
+        let [shortest, longest] = PATH_LENGTHS;
+        let length = (PATH_VERTICES / pixels.max(1) as f32).clamp(shortest, longest);
+        Self { most_survival: survival_for(length), ..self }
+    }
+
+    /// Greatest probability with which roulette lets a path go on. Below one, so that a closed white scene lets go.
+    #[inline]
+    pub fn most_survival(&self) -> f32 {
+        self.most_survival
     }
 
     /// The scene's data.
@@ -400,4 +422,8 @@ impl World {
             false => emission,
         }
     }
+}
+
+fn survival_for(length: f32) -> f32 {
+    1.0 - 1.0 / length
 }

@@ -6,33 +6,33 @@ use crate::shading::bsdf::Bsdf;
 use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
 
-/// Bounds of the probability that a path goes on. Below one, so that a closed white scene lets go.
-const SURVIVAL: [f32; 2] = [0.05, 0.98];
+/// Least probability that a path goes on; the greatest is the world's.
+const LEAST: f32 = 0.05;
 
 /// Probability `q` with which a path goes on from a surface: the albedo of what is continuous, given that the
 /// segment ended there.
-pub fn survival(bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
-    bounded(bsdf.continuous_albedo(wo).max_element() / end_probability)
+pub fn survival(world: &World, bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
+    bounded(world, bsdf.continuous_albedo(wo).max_element() / end_probability)
 }
 
-fn bounded(albedo: f32) -> f32 {
+fn bounded(world: &World, albedo: f32) -> f32 {
     // false for NaN
-    if albedo > SURVIVAL[0] { albedo.min(SURVIVAL[1]) } else { SURVIVAL[0] }
+    if albedo > LEAST { albedo.min(world.most_survival()) } else { LEAST }
 }
 
 /// How a path that came to an arrival from `from` would go on back along the segment that ended there: the probability
 /// that it does at all, and the density of that direction.
 pub fn reversed(world: &World, a: &Arrival, from: Vec3) -> (f32, f32) {
     if a.class == SurfaceClass::Diffuse {
-        return (bounded(a.reflectance.max_element()), a.back_pdf);
+        return (bounded(world, a.reflectance.max_element()), a.back_pdf);
     }
     let bsdf = a.bsdf_from(world, from);
-    (survival(&bsdf, from, bsdf.end_probability(from)), bsdf.continuous_pdf(from, a.wo).0)
+    (survival(world, &bsdf, from, bsdf.end_probability(from)), bsdf.continuous_pdf(from, a.wo).0)
 }
 
 /// The same at the first arrivals of a camera path, which decide most of the picture's noise: paths are longer there.
 pub fn early_survival(q: f32) -> f32 {
-    q.sqrt().min(SURVIVAL[1])
+    q.sqrt()
 }
 
 /// The end of a segment as it is stored; `goes_on` is the caller's to set.
@@ -51,7 +51,7 @@ pub fn arrival(world: &World, end: &End) -> Arrival {
         at: hit.address(),
         reflectance,
         back_pdf,
-        survival: survival(&vertex.bsdf, *wo, *end_probability),
+        survival: survival(world, &vertex.bsdf, *wo, *end_probability),
         class,
         goes_on: false,
     }

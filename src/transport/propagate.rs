@@ -121,3 +121,6 @@ impl Reflected {
         starts.par_chunks(GRAIN).enumerate().flat_map_iter(some_paths).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

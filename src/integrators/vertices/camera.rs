@@ -54,7 +54,7 @@ impl CameraSampler<'_> {
             weight: chain.throughput / chain.forward,
             inverse_n2: 1.0 / (chain.index * chain.index),
             bounces: chain.passages,
-            survival: survival_at(&end),
+            survival: survival_at(rules.world, &end),
             sum: self.first(ray, &chain, &end),
             end,
         };
@@ -99,7 +99,7 @@ impl CameraSampler<'_> {
                 weight: weight * chain.throughput / chain.forward,
                 inverse_n2: inverse_n2 / (chain.index * chain.index),
                 bounces: tip.bounces + 1 + chain.passages,
-                survival: survival_at(&end),
+                survival: survival_at(rules.world, &end),
                 sum: after(rules, &left.turn, &chain, tip.end.hit.place.position, left.cos, &end),
                 end,
             };

@@ -80,7 +80,7 @@ fn vertices(
     let mut sum = first(rules, &ray, &chain, &end);
     let mut bounces = chain.passages;
     while bounces < rules.max_depth && flux.max_element() > 0.0 {
-        let survival = survival_at(&end);
+        let survival = survival_at(world, &end);
         let End { hit, wo, opacity, .. } = &end;
         let (wo, opacity) = (*wo, *opacity);
         let vertex = Vertex { hit, bsdf: &end.vertex.bsdf, wo, survival, sum };

@@ -89,8 +89,8 @@ pub struct Leaving {
 }
 
 /// Probability that roulette lets a path go on that arrived at `end`.
-pub fn survival_at(end: &End) -> f32 {
-    survival(&end.vertex.bsdf, end.wo, end.end_probability)
+pub fn survival_at(world: &World, end: &End) -> f32 {
+    survival(world, &end.vertex.bsdf, end.wo, end.end_probability)
 }
 
 impl Vertex<'_> {
@@ -120,7 +120,7 @@ impl Vertex<'_> {
             true => (1.0, self.survival),
             false => {
                 let ends = back.end_probability(direction);
-                (ends, survival(&back, direction, ends))
+                (ends, survival(rules.world, &back, direction, ends))
             }
         };
         let turn = Turn {

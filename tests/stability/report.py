@@ -1,0 +1,96 @@
+"""Runs the whole stability suite and writes docs/stability.md with its plots.
+
+Run: make stress
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import suite  # noqa: F401  (registers the cases)
+from case import CASES, Case, Row
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+HEAD = Path(__file__).with_name("report_head.md")
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """Markdown rows."""
+    lines = [
+        "| parameter | expected | got | off | noise | allowed | verdict |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | --- |",
+    ]
+    for r in rows:
+        verdict = "right" if r.is_right else "**wrong**"
+        if r.refused:
+            verdict += f", {r.refused} samples refused"
+        lines.append(
+            f"| {r.parameter} | {r.expected:.6g} | {r.got:.6g} | {r.off:+.2%} | {r.noise:.2%} "
+            f"| {r.tolerance:.2%} | {verdict} |"
+        )
+    return lines
+
+
+def plot(case: Case, rows: Sequence[Row]) -> str | None:
+    """Draws deviations over the parameter, if that is a number; the picture's name."""
+    if any(r.at is None for r in rows):
+        return None
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(6, 3), layout="constrained")
+    for line in dict.fromkeys(r.line for r in rows):
+        own = [r for r in rows if r.line == line]
+        at, off = [r.at for r in own], [100 * r.off for r in own]
+        axes.errorbar(
+            at, off, [100 * r.noise for r in own], marker="o", capsize=3, label=line or None
+        )
+    for sign in (-1, 1):
+        axes.plot(
+            [r.at for r in rows],
+            [sign * 100 * r.tolerance for r in rows],
+            color="grey",
+            lw=0.8,
+            ls=":",
+        )
+    axes.axhline(0, color="black", lw=0.8)
+    axes.set_xscale("log")
+    axes.set_ylabel("off, %")
+    axes.set_title(case.name, fontsize=9)
+    if any(r.line for r in rows):
+        axes.legend(fontsize=7)
+    name = f"stability_{case.run.__name__}.png"
+    figure.savefig(DOCS / "pictures" / name, dpi=110)
+    pyplot.close(figure)
+    return name
+
+
+def main() -> int:
+    """Runs all cases; 1 if a row is wrong."""
+    text, wrong, count = [HEAD.read_text().rstrip()], 0, 0
+    group = ""
+    for case in CASES:
+        start = time.monotonic()
+        rows = list(case.run(True))
+        bad = sum(not r.is_right for r in rows)
+        count, wrong = count + len(rows), wrong + bad
+        seconds = time.monotonic() - start
+        print(
+            f"{case.run.__name__}: {len(rows) - bad} of {len(rows)} right, {seconds:.0f} s",
+            flush=True,
+        )
+        if case.group != group:
+            group = case.group
+            text += ["", f"## {group}"]
+        text += ["", f"### {case.name}", "", f"The right value: {case.answer}.", "", *table(rows)]
+        if name := plot(case, rows):
+            text += ["", f"![{case.name}](pictures/{name})"]
+    text[0] = text[0].replace("COUNT", str(count)).replace("WRONG", str(wrong))
+    (DOCS / "stability.md").write_text("\n".join(text) + "\n")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
