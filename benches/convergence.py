@@ -1,8 +1,9 @@
 """The reports of docs/convergence: error against run time of the method, its parts and its rivals.
 
-Two interiors come from the scenes that are shared between renderers (SEGUE_SHARED, or ../shared beside the
-checkout) and are left out, with a word, where those are not. References are means of independent renders by
-`segment` with a small fixed kernel, which finds every scene's light and blurs a third of a pixel. Run:
+The scenes come from those that are shared between renderers (SEGUE_SHARED, or ../shared beside the checkout); without
+them it says so and does nothing. Four have references by other renderers, at twice the resolution. Those of the two
+interiors are means of independent renders by `segment` with a small fixed kernel, which blurs a third of a
+pixel; how far two halves of them are apart is printed. Run:
 .venv/bin/python benches/convergence.py [SCENE ...]
 """
 
@@ -19,20 +20,28 @@ import numpy as np
 from segue import Render, images, usd
 
 ROOT = Path(__file__).parent.parent
-SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "scenes"
+SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared"))
 REPORTS = ROOT / "docs" / "convergence"
 METHODS = "segment,segment-fixed,mvf,photon-filter,bpm,vcm,path"
-SCENES = {
-    "bathroom": (SHARED / "bathroom" / "bathroom.usdc", (180, 120)),
-    "kitchen": (SHARED / "kitchen-ppg" / "kitchen-ppg.usdc", (180, 120)),
-    "glass_caustic": (ROOT / "scenes" / "glass_caustic.usda", (192, 108)),
-    "lamp": (ROOT / "scenes" / "lamp.usda", (192, 108)),
-    "door_ajar": (ROOT / "scenes" / "door_ajar.usda", (192, 108)),
+#: Stages, with resolutions where no reference has one.
+INTERIORS = {
+    "bathroom": (SHARED / "scenes" / "bathroom" / "bathroom.usdc", (180, 120)),
+    "kitchen": (SHARED / "scenes" / "kitchen-ppg" / "kitchen-ppg.usdc", (180, 120)),
 }
-#: Seconds of two threads for a reference, and of one thread for each method.
-REFERENCE_SECONDS = 150.0
-SECONDS = 24.0
+OTHERS = ("cornell_glass", "lamp", "ajar_door", "glossy_box")
+#: Seconds of one thread for a reference, and for each method.
+REFERENCE_SECONDS = 420.0
+SECONDS = 30.0
 KERNEL = 0.35
+
+
+def halved(made: Path, into: Path) -> tuple[int, int]:
+    """Writes a reference at half its resolution, which is returned."""
+    pixels = images.read_rgb(made).astype(np.float64)
+    height, width = pixels.shape[0] // 2, pixels.shape[1] // 2
+    mean = pixels.reshape(height, 2, width, 2, 3).mean((1, 3))
+    images.write_exr(into, {"Combined": mean.astype(np.float32)}, {})
+    return width, height
 
 
 def reference(stage: Path, resolution: tuple[int, int], into: Path) -> None:
@@ -46,7 +55,8 @@ def reference(stage: Path, resolution: tuple[int, int], into: Path) -> None:
             "kernel": "fixed",
             "kernel_size": KERNEL,
         }
-        job = Render(scene, {**settings, "time": 15.0, "seed": 2**30 + len(renders)})
+        seed = 2**30 + len(renders)
+        job = Render(scene, {**settings, "time": 30.0, "seed": seed, "threads": 1})
         job.run()
         renders.append(job.read_pass("Combined")[..., :3].astype(np.float64))
     even, odd = np.mean(renders[::2], axis=0), np.mean(renders[1::2], axis=0)
@@ -62,25 +72,25 @@ def reference(stage: Path, resolution: tuple[int, int], into: Path) -> None:
 def main(names: list[str]) -> int:
     """Makes the reports of these scenes, or of all."""
     REPORTS.mkdir(parents=True, exist_ok=True)
-    for name in names or SCENES:
-        stage, resolution = SCENES[name]
+    for name in names or [*INTERIORS, *OTHERS]:
+        stage = SHARED / "peers" / "usd" / f"{name}.usda"
+        resolution = (0, 0)
+        if name in INTERIORS:
+            stage, resolution = INTERIORS[name]
         if not stage.exists():
             print(f"skipped: {stage} does not exist", flush=True)
             continue
         with tempfile.TemporaryDirectory() as folder:
             made = Path(folder) / "reference.exr"
-            reference(stage, resolution, made)
+            if name in INTERIORS:
+                reference(stage, resolution, made)
+            else:
+                resolution = halved(SHARED / "peers" / "refs" / f"{name}.exr", made)
             command = [sys.executable, "-m", "segue", "converge", str(stage), "--quiet"]
             command += ["--methods", METHODS, "--time", str(SECONDS), "--threads", "1"]
-            command += [
-                "--resolution",
-                "{}x{}".format(*resolution),
-                "--reference",
-                str(made),
-            ]
-            status = subprocess.run(
-                [*command, "-o", str(REPORTS / name)], check=False
-            ).returncode
+            command += ["--resolution", "{}x{}".format(*resolution)]
+            command += ["--reference", str(made), "-o", str(REPORTS / name)]
+            status = subprocess.run(command, check=False).returncode
             if status:
                 return status
     return 0

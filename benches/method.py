@@ -108,7 +108,7 @@ def consistency(seeds: int = 4, samples: int = 12) -> None:
                 print(json.dumps(row), flush=True)
 
 
-def gallery(seeds: int = 8, samples: int = 192) -> None:
+def gallery(seeds: int = 6, samples: int = 96) -> None:
     """Means of the gallery's scenes by size of a fixed kernel, beside an unbiased method, as JSON lines.
 
     All methods take the same camera samples for a seed, so what camera rays see straight or through glass (glints of

@@ -57,17 +57,21 @@ class Case:
     #: Where the right value comes from.
     answer: str
     run: Callable[[bool], Rows]
+    #: What `Row.at` is, in plots.
+    axis: str = ""
 
 
 CASES: list[Case] = []
 
 
-def case(group: str, answer: str) -> Callable[[Callable[[bool], Rows]], Callable[[bool], Rows]]:
+def case(
+    group: str, answer: str, axis: str = ""
+) -> Callable[[Callable[[bool], Rows]], Callable[[bool], Rows]]:
     """Registers a case; its name is the function's documentation."""
 
     def register(run: Callable[[bool], Rows]) -> Callable[[bool], Rows]:
         name = (run.__doc__ or run.__name__).strip().rstrip(".")
-        CASES.append(Case(group, name, answer, run))
+        CASES.append(Case(group, name, answer, run, axis))
         return run
 
     return register

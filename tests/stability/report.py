@@ -57,6 +57,7 @@ def plot(case: Case, rows: Sequence[Row]) -> str | None:
         )
     axes.axhline(0, color="black", lw=0.8)
     axes.set_xscale("log")
+    axes.set_xlabel(case.axis)
     axes.set_ylabel("off, %")
     axes.set_title(case.name, fontsize=9)
     if any(r.line for r in rows):

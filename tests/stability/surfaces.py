@@ -20,7 +20,7 @@ def ball(surface: dict) -> Stage:
     return s
 
 
-@case(GROUP, "1: nothing is lost in a white furnace")
+@case(GROUP, "1: nothing is lost in a white furnace", axis="roughness")
 def roughness(full: bool) -> Rows:
     """Metal and glass by roughness, through the threshold of Dirac lobes."""
     steps = (0.0, 1e-4, 1e-3, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.3, 0.6, 1.0)
