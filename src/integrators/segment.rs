@@ -8,7 +8,7 @@ use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::grid::Grid;
-use crate::transport::guiding::{Guiding, Start};
+use crate::transport::guiding::{Guiding, Outcome, Start};
 use crate::transport::light::LightSampler;
 use crate::transport::propagate::Reflected;
 use crate::transport::store::{CameraStore, LightStore};
@@ -71,9 +71,9 @@ impl Integrator for Segment {
             true => {
                 self.gather(context);
                 costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-                if self.techniques.emission_guiding && Guiding::is_wanted(index, self.light.starts.len()) {
-                    self.learn(context, index, &cut);
-                    costs.stage("guiding", self.guiding.bytes());
+                if self.techniques.emission_guiding && self.guiding.is_wanted(self.light.starts.len()) {
+                    let bytes = self.learn(context, &cut);
+                    costs.stage("guiding", bytes);
                 }
                 IterationEnd::Complete
             }
@@ -247,15 +247,17 @@ impl Segment {
     }
 
     /// Learns from this iteration where light paths should begin, by what they bring as a share of what is shown.
-    fn learn(&mut self, context: &Context, index: u32, cut: &Cut) {
-        let Ok(shown) = context.film.read_pass(Pass::Combined, context.film.rect()) else { return };
+    /// Returns the bytes that it took.
+    fn learn(&mut self, context: &Context, cut: &Cut) -> usize {
+        let Ok(shown) = context.film.read_pass(Pass::Combined, context.film.rect()) else { return 0 };
         let shown: Vec<f32> =
             shown.chunks_exact(4).map(|c| luminance(Vec3::new(c[0], c[1], c[2])).max(0.0)).collect();
         let mean = shown.iter().map(|&l| f64::from(l)).sum::<f64>() / shown.len() as f64;
         let floor = DARK * mean as f32;
         let starts = self.primaries.iter().zip(&shown).filter_map(|(p, l)| {
             let worth = p.weight * (LUMINANCE / (l + floor));
-            Some(Start { arrival: p.arrival?, worth: if worth.is_finite() { worth } else { Vec3::ZERO } })
+            let worth = if worth.is_finite() { worth } else { Vec3::ZERO };
+            Some(Start { arrival: p.arrival?, passages: p.passages, worth })
         });
         let starts: Vec<Start> = starts.collect();
         let sampled = Sampled {
@@ -265,7 +267,8 @@ impl Segment {
             clusters: &self.clusters,
             bridges: self.techniques.bridges.map(|_| &self.bridges),
         };
-        self.guiding.learn(sampled, &self.weights, &starts, index, cut);
+        let (weights, reflected, max_depth) = (&self.weights, &self.reflected, context.max_depth);
+        self.guiding.learn(Outcome { sampled, weights, reflected, starts: &starts, max_depth }, cut)
     }
 
     /// Segments of this iteration.

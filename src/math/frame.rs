@@ -16,7 +16,8 @@ pub struct Frame {
 impl Frame {
     /// A frame around the unit vector `n` (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
     pub fn from_normal(n: Vec3) -> Self {
-        let sign = 1f32.copysign(n.z);
+        // both zeros alike: directions that differ in them alone are the same
+        let sign = if n.z < 0.0 { -1.0 } else { 1.0 };
         let a = -1.0 / (sign + n.z);
         let b = n.x * n.y * a;
         Self {

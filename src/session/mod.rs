@@ -117,9 +117,11 @@ impl Session {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(settings.threads).build()?;
         let film = Film::new(settings.crop.width, settings.crop.height, settings.passes)?;
         let sensor = Sensor::new(&scene.camera, settings.resolution[0], settings.resolution[1]);
-        let [width, height] = settings.resolution.map(u64::from);
         let world = pool.install(|| World::new(Arc::new(scene), settings.keep_all))?;
-        let world = world.with_paths_for(width * height);
+        let world = match settings.kept_paths() {
+            Some(paths) => world.with_kept_paths(paths),
+            None => world,
+        };
         let cost = |c: &BuildCost| (c.name.to_string(), Stage { seconds: c.seconds, bytes: c.bytes });
         let mut build: BTreeMap<String, Stage> = world.costs().iter().map(cost).collect();
         let bytes = Film::memory_bytes(film.width(), film.height(), settings.passes);

@@ -218,6 +218,14 @@ impl Json {
 const MAX_THREADS: usize = 1024;
 
 impl Settings {
+    /// Paths that are kept at a time, where they may be of any length.
+    pub fn kept_paths(&self) -> Option<f32> {
+        use Method::{Mvf, PhotonFilter, Segment, SegmentBridge, SegmentPath};
+        let keeps = matches!(self.method, Segment | SegmentBridge | SegmentPath | Mvf | PhotonFilter);
+        let pixels = self.resolution[0] as f32 * self.resolution[1] as f32;
+        (keeps && self.max_depth.is_none()).then_some(pixels * self.techniques.light_paths.max(1.0))
+    }
+
     /// Reads and checks the JSON of `docs/abi.md`; the error says what is wrong with which key.
     pub fn from_json(json: &str) -> Result<Self, String> {
         let j: Json = serde_json::from_str(json).map_err(|e| format!("settings: {e}"))?;

@@ -6,7 +6,7 @@ use super::surface::{normalize_any, place};
 use super::texture::MeshPoint;
 use super::world::World;
 use crate::accel::Ray;
-use crate::math::density::{AreaPdf, DiscreteProbability, EtenduePdf, SolidAnglePdf};
+use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
 use glam::{Vec2, Vec2Swizzles, Vec3};
 
 /// The first ray of a light path.
@@ -36,18 +36,18 @@ pub enum SourceDensity {
 }
 
 impl World {
-    /// Draws the first ray of a light path, by power and by what the guide has learnt. `u`: a uniform number for
-    /// the emitter, two for the place and two for the direction.
+    /// Draws the first ray of a light path, by power and by what the guide has learnt. Of the uniform numbers, `u`
+    /// chooses the emitter.
     pub fn sample_emission(
         &self,
         guide: &EmissionGuide,
-        u: f32,
+        u: Vec2,
         place_u: Vec2,
         direction_u: Vec2,
     ) -> Option<LightRay> {
         let draw = guide.draw(&self.emitters, u, place_u, direction_u)?;
         let (id, [x, y, z, w]) = (draw.emitter, draw.at);
-        let chosen = DiscreteProbability(self.emitters.emission_probability(id).0 * guide.relative(&draw));
+        let factor = self.emitters.emission_probability(id).0 * guide.relative(&draw);
         let s = self.emitters.sample_from(id, Vec2::new(x, y), Vec2::new(z, w))?;
         let (mut ray, mut emission, mut point) = (Ray::new(s.origin, s.direction), s.emission, s.origin);
         if let (Some(b), Some((instance, triangle))) = (s.barycentrics, self.emitters.triangle_of(id)) {
@@ -60,11 +60,11 @@ impl World {
                 *radiance = self.visible_emission(instance, &at);
             }
         }
-        let flux = emission.flux() / chosen.0;
+        let flux = emission.flux() / factor;
         let density = match emission {
-            Emission::Extended { pdf, .. } => SourceDensity::Extended(pdf * chosen),
-            Emission::Point { pdf, .. } => SourceDensity::Point(pdf * chosen),
-            Emission::Beam { pdf, .. } => SourceDensity::Beam(pdf * chosen),
+            Emission::Extended { pdf, .. } => SourceDensity::Extended(EtenduePdf(pdf.0 * factor)),
+            Emission::Point { pdf, .. } => SourceDensity::Point(SolidAnglePdf(pdf.0 * factor)),
+            Emission::Beam { pdf, .. } => SourceDensity::Beam(AreaPdf(pdf.0 * factor)),
         };
         let hit = EmitterHit {
             emitter: id,
@@ -79,38 +79,30 @@ impl World {
 
     /// Density of the light paths that leave towards where this light was met from.
     pub fn emission_pdf(&self, guide: &EmissionGuide, light: &LightPoint) -> EtenduePdf {
-        let chosen = self.emission_probability(guide, -light.direction, &light.hit);
-        self.emitters.pdf_from(light.direction, &light.hit) * chosen
+        let factor = self.emission_factor(guide, -light.direction, &light.hit);
+        EtenduePdf(self.emitters.pdf_from(light.direction, &light.hit).0 * factor)
     }
 
     /// Density of the light paths that leave a sampled point of a light towards the receiver: per étendue; of
     /// a delta light, per area across the light's direction.
     pub fn emission_pdf_of_sample(&self, guide: &EmissionGuide, light: &LightSample) -> f32 {
-        let chosen = self.emission_probability(guide, -light.direction, &light.hit).0;
+        let factor = self.emission_factor(guide, -light.direction, &light.hit);
         match light.is_delta {
             true => {
                 let LightSample { hit, direction, .. } = light;
-                chosen * self.emitters.pdf_of_rays(hit.emitter, -*direction, hit.distance).0
+                factor * self.emitters.pdf_of_rays(hit.emitter, -*direction, hit.distance).0
             }
-            false => chosen * self.emitters.pdf_from(light.direction, &light.hit).0,
+            false => factor * self.emitters.pdf_from(light.direction, &light.hit).0,
         }
     }
 
     /// Factor on an emitter's density of the rays that leave it along `direction` where `hit` says: the probability
     /// of choosing it, and how much the guide favours the ray.
-    fn emission_probability(
-        &self,
-        guide: &EmissionGuide,
-        direction: Vec3,
-        hit: &EmitterHit,
-    ) -> DiscreteProbability {
-        let chosen = self.emitters.emission_probability(hit.emitter);
+    fn emission_factor(&self, guide: &EmissionGuide, direction: Vec3, hit: &EmitterHit) -> f32 {
+        let chosen = self.emitters.emission_probability(hit.emitter).0;
         match guide.is_empty() {
             true => chosen,
-            false => {
-                let relative = guide.relative(&self.emitters.draw_of(direction, hit));
-                DiscreteProbability(chosen.0 * relative)
-            }
+            false => chosen * guide.relative(&self.emitters.draw_of(direction, hit)),
         }
     }
 

@@ -50,7 +50,7 @@ pub struct World {
     most_survival: f32,
 }
 
-/// Vertices of a path between white walls, on average, where a picture has many pixels, and at most.
+/// Vertices of a path between white walls, on average: where there are many paths, and at most.
 const PATH_LENGTHS: [f32; 2] = [50.0, 2000.0];
 /// Such vertices of all paths of an iteration together, where they may be longer.
 const PATH_VERTICES: f32 = (1 << 23) as f32;
@@ -141,12 +141,12 @@ impl World {
         Ok(Self { scene, accel, materials, emitters, classes, needs, warnings, costs, most_survival })
     }
 
-    /// For pictures of so many pixels, all of whose paths are kept at a time: the fewer, the longer they may be. Roulette
-    /// that ends a path more often than surfaces absorb makes the noise of closed rooms grow with every bounce, and
-    /// without bound where `albedo² > survival`.
-    pub fn with_paths_for(self, pixels: u64) -> Self {
+    /// For so many paths from the camera, or from the lights, that are kept at a time: the fewer, the longer they may
+    /// be. Roulette that ends a path more often than surfaces absorb makes the noise of closed rooms grow with every
+    /// bounce, and without bound where `albedo² > survival`.
+    pub fn with_kept_paths(self, paths: f32) -> Self {
         let [shortest, longest] = PATH_LENGTHS;
-        let length = (PATH_VERTICES / pixels.max(1) as f32).clamp(shortest, longest);
+        let length = (PATH_VERTICES / paths.max(1.0)).clamp(shortest, longest);
         Self { most_survival: survival_for(length), ..self }
     }
 

@@ -5,8 +5,9 @@
 //! judged by its brightness. The densities of later iterations rest on what earlier ones found, and of every iteration
 //! on nothing of its own: that biases nothing.
 
-use super::exchange::{GRAIN, has_end, per_diffuse_cluster, segments};
+use super::exchange::{GRAIN, has_end, per_diffuse_cluster};
 use super::photons::photon_values;
+use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use super::{Cut, store::LightStore};
 use crate::shading::SurfaceClass;
@@ -17,12 +18,17 @@ use rayon::prelude::*;
 /// Lessons of an iteration at most, and what is enough for a guide.
 const MOST: usize = 1 << 17;
 
+/// Iterations that teach at most, where photons are few.
+const LAST: u32 = 32;
+
 /// A guide, and what its successor is to be made of.
 #[derive(Debug, Default)]
 pub struct Guiding {
     /// Where light paths should begin, as far as it is known.
     pub guide: EmissionGuide,
     lessons: Vec<Lesson>,
+    /// Iterations so far.
+    iterations: u32,
 }
 
 /// The first arrival of a camera path.
@@ -30,39 +36,58 @@ pub struct Guiding {
 pub struct Start {
     /// Its number.
     pub arrival: u32,
+    /// Dirac lobes before it.
+    pub passages: u32,
     /// What one unit of light that it reflects adds to the picture.
     pub worth: Vec3,
 }
 
+/// What an iteration came to.
+#[derive(Clone, Copy)]
+pub struct Outcome<'a> {
+    /// What was sampled.
+    pub sampled: Sampled<'a>,
+    /// How it was weighed.
+    pub weights: &'a Weights,
+    /// What it reflects.
+    pub reflected: &'a Reflected,
+    /// First arrivals of all paths that have one, in order.
+    pub starts: &'a [Start],
+    /// Bounces up to which light counts.
+    pub max_depth: Option<u32>,
+}
+
 impl Guiding {
-    /// Whether the iteration `index`, with so many light paths, has something to teach. The guide changes after the
-    /// first iteration, and whenever the number of iterations has doubled; the last ones before teach it, as
-    /// many as are needed.
-    pub fn is_wanted(index: u32, paths: usize) -> bool {
-        let left = (index + 1).next_power_of_two() - (index + 1);
-        paths > 0 && left as usize * paths < MOST
+    /// An iteration, with so many light paths that arrived, is over: whether it has something to teach. The guide changes
+    /// after the first, and whenever the number of iterations has doubled; the last ones before teach it, as many
+    /// as are needed.
+    pub fn is_wanted(&mut self, paths: usize) -> bool {
+        self.iterations += 1;
+        let left = self.iterations.next_power_of_two() - self.iterations;
+        paths > 0 && left < LAST && left as usize * paths < MOST
     }
 
-    /// Learns from the iteration `index`: `starts` are the first arrivals of all paths that have one, in order.
-    pub fn learn(&mut self, s: Sampled, w: &Weights, starts: &[Start], index: u32, cut: &Cut) {
-        let worth = worth_of_paths(s, w, starts, cut);
+    /// Learns from an iteration. Returns the bytes that it took.
+    pub fn learn(&mut self, o: Outcome, cut: &Cut) -> usize {
+        let worth = worth_of_paths(o, cut);
         let stride = worth.len().div_ceil(MOST).max(1);
-        let chosen = s.light.starts.iter().zip(worth).step_by(stride);
+        let bytes = o.reflected.carried.len() * size_of::<Vec3>()
+            + o.sampled.light.photons.len() * size_of::<Vec3>()
+            + worth.len() * size_of::<f32>();
+        let chosen = o.sampled.light.starts.iter().zip(worth).step_by(stride);
         self.lessons.extend(chosen.map(|(start, worth)| Lesson { draw: start.draw, worth }));
-        if (index + 1).is_power_of_two() && !cut.is_raised() {
-            self.guide = s.world.emission_guide(std::mem::take(&mut self.lessons));
+        let bytes = bytes + self.lessons.capacity() * size_of::<Lesson>();
+        if self.iterations.is_power_of_two() && !cut.is_raised() {
+            self.guide = o.sampled.world.emission_guide(std::mem::take(&mut self.lessons));
         }
-    }
-
-    /// Memory, bytes.
-    pub fn bytes(&self) -> usize {
-        self.guide.bytes() + self.lessons.capacity() * size_of::<Lesson>()
+        bytes + self.guide.bytes()
     }
 }
 
 /// What every light path of the store brought.
-fn worth_of_paths(s: Sampled, w: &Weights, starts: &[Start], cut: &Cut) -> Vec<f32> {
-    let arrivals = worth_of_arrivals(s, w, starts);
+fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
+    let Outcome { sampled: s, weights: w, .. } = o;
+    let arrivals = worth_of_arrivals(o);
     let shared = per_diffuse_cluster(s, cut, |c| {
         let reflecting = s.cameras(c).map(|i| (arrivals[i] * s.camera.arrivals[i].reflectance).as_dvec3());
         reflecting.sum::<DVec3>().as_vec3()
@@ -70,6 +95,9 @@ fn worth_of_paths(s: Sampled, w: &Weights, starts: &[Start], cut: &Cut) -> Vec<f
     let values = photon_values(s, w);
     let cameras = s.camera.arrivals.len();
     let of_photon = |j: usize| {
+        if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons[j].bounces >= most) {
+            return 0.0;
+        }
         let place = s.clusters.place[cameras + j];
         let k = s.clusters.of[cameras + j] as usize;
         let c = &s.clusters.clusters[k];
@@ -90,22 +118,27 @@ fn worth_of_paths(s: Sampled, w: &Weights, starts: &[Start], cut: &Cut) -> Vec<f
 }
 
 /// What one unit of basic radiance that each camera arrival reflects of its photons adds to the picture.
-fn worth_of_arrivals(s: Sampled, w: &Weights, starts: &[Start]) -> Vec<Vec3> {
-    let constants = segments(s, w);
+fn worth_of_arrivals(o: Outcome) -> Vec<Vec3> {
+    let Outcome { sampled: s, weights: w, starts, .. } = o;
+    let constants = &o.reflected.segments;
     let n = s.camera.arrivals.len();
     let some_paths = |(k, paths): (usize, &[Start])| {
         let first = paths[0].arrival as usize;
         let end = starts.get((k + 1) * GRAIN).map_or(n, |e| e.arrival as usize);
         let mut worth = vec![Vec3::ZERO; end - first];
-        for p in paths {
-            worth[p.arrival as usize - first] = p.worth;
-        }
-        for i in first..end {
-            if has_end(s, i) {
-                let along = worth[i - first] * constants[i].along_path(s, w, i) * constants[i].carry;
-                worth[i + 1 - first] = along;
+        for (p, next) in paths.iter().zip(paths.iter().skip(1).map(Some).chain([None])) {
+            let (mut along, mut bounces) = (p.worth, p.passages);
+            for i in p.arrival as usize..next.map_or(end, |p| p.arrival as usize) {
+                if o.max_depth.is_some_and(|most| bounces >= most) {
+                    break;
+                }
+                worth[i - first] = along * s.camera.inverse_n2[i];
+                if !has_end(s, i) {
+                    break;
+                }
+                along *= constants[i].along_path(s, w, i) * constants[i].carry;
+                bounces = bounces.saturating_add(1 + s.camera.outgoing[i].passages);
             }
-            worth[i - first] *= s.camera.inverse_n2[i];
         }
         worth
     };

@@ -27,7 +27,7 @@ pub struct LightSampler<'a> {
 impl LightSampler<'_> {
     /// Samples path number `path` into the store. Adds the rays it takes to `rays`.
     pub fn path(&self, path: u32, sampler: &mut Sampler, store: &mut LightStore, rays: &mut u64) {
-        let (u, place, direction) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
+        let (u, place, direction) = (sampler.next_2d(), sampler.next_2d(), sampler.next_2d());
         let Some(ray) = self.world.sample_emission(self.guide, u, place, direction) else { return };
         let follow = Follow { world: self.world, walk: Walk::Light, from_camera: false };
         let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);

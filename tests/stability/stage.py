@@ -61,6 +61,8 @@ class Stage:
     """A scene whose units are multiplied by `scale` and which is moved by `shift`."""
 
     scale: float = 1.0
+    #: Of what is added next, for messages.
+    name: str = "object"
     shift: Vector = (0.0, 0.0, 0.0)
     scene: segue.Scene = field(default_factory=segue.Scene)
 
@@ -73,7 +75,7 @@ class Stage:
 
     def material(self, surface: dict[str, Any], **more: Any) -> int:
         """Adds a material."""
-        return self.scene.add_material("material", {"surface": surface, **more})
+        return self.scene.add_material(self.name, {"surface": surface, **more})
 
     def mesh(
         self,
@@ -86,9 +88,9 @@ class Stage:
         """Adds triangles at a transform."""
         points = np.asarray(points, np.float32)
         normals = points if smooth else None
-        mesh = self.scene.add_mesh("mesh", points, np.ravel(triangles), normals=normals)
+        mesh = self.scene.add_mesh(self.name, points, np.ravel(triangles), normals=normals)
         m = self._world(np.eye(4) if at is None else at)
-        self.scene.add_instances("mesh", mesh, m, [self.material(surface)])
+        self.scene.add_instances(self.name, mesh, m, [self.material(surface)])
 
     def quad(self, corners: Any, surface: dict[str, Any]) -> None:
         """Adds a quadrilateral."""
@@ -108,7 +110,7 @@ class Stage:
     def light(self, kind: str, at: Any = None, **keys: Any) -> None:
         """Adds a light at a transform."""
         m = self._world(np.eye(4) if at is None else at)
-        self.scene.add_light(kind, {"type": kind, "transform": m.ravel().tolist(), **keys})
+        self.scene.add_light(self.name, {"type": kind, "transform": m.ravel().tolist(), **keys})
 
     def camera(self, eye: Vector, target: Vector, half: float, **keys: Any) -> None:
         """Sets a camera whose window is `half` to every side."""

@@ -8,7 +8,7 @@ use crate::film::Sample;
 use crate::integrators::record;
 use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
-use crate::shading::emitters::Receiver;
+use crate::shading::emitters::{PLAIN, Receiver};
 use crate::shading::{CameraRay, LightPoint, Piece, SurfacePoint, World};
 use crate::shading::{Sensor, Vertex as Shading};
 use crate::transport::walk::{Chain, End, Follow, Witness};
@@ -140,8 +140,8 @@ impl CameraSampler<'_> {
         }
         // per étendue; of a delta light, per area of this surface
         let (drawn, emitted) = match light.is_delta {
-            true => (light.pdf, rules.world.emission_pdf_of_sample(rules.guide, &light) * left.cos),
-            false => (light.pdf / left.cos, rules.world.emission_pdf_of_sample(rules.guide, &light)),
+            true => (light.pdf, rules.world.emission_pdf_of_sample(&PLAIN, &light) * left.cos),
+            false => (light.pdf / left.cos, rules.world.emission_pdf_of_sample(&PLAIN, &light)),
         };
         let weight = mis::next_event(&left.turn, drawn, emitted, light.is_delta);
         let arriving = light.radiance * visible * (left.cos * weight / light.pdf);
@@ -290,7 +290,7 @@ impl Witness for Meeting<'_, '_> {
             0 => self.rules.world.pdf_of_sampling(&self.receiver, light) / self.cos,
             _ => 0.0,
         };
-        self.add(chain, light.radiance, drawn, self.rules.world.emission_pdf(self.rules.guide, light).0);
+        self.add(chain, light.radiance, drawn, self.rules.world.emission_pdf(&PLAIN, light).0);
     }
 
     fn glow(&mut self, chain: &Chain, radiance: Vec3) {

@@ -5,6 +5,7 @@ use super::vertex::{LightVertex, Rules, Vertex, survival_at};
 use crate::film::Splat;
 use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
+use crate::shading::emitters::PLAIN;
 use crate::shading::{LightRay, Piece, SourceDensity, SurfaceClass};
 use crate::transport::walk::{Chain, End, Follow, Nobody};
 use glam::{Vec2, Vec3};
@@ -71,8 +72,8 @@ fn vertices(
     rays: &mut u64,
 ) {
     let world = rules.world;
-    let (u, place, direction) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
-    let Some(ray) = world.sample_emission(rules.guide, u, place, direction) else { return };
+    let (u, place, direction) = (sampler.next_2d(), sampler.next_2d(), sampler.next_2d());
+    let Some(ray) = world.sample_emission(&PLAIN, u, place, direction) else { return };
     let follow = Follow { world, walk: Walk::Light, from_camera: false };
     let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
     let Some(mut end) = end else { return };

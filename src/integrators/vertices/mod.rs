@@ -28,7 +28,6 @@ mod vertex;
 use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::{Sample, SplatBuffer, is_wanted};
 use crate::math::Sampler;
-use crate::shading::emitters::PLAIN;
 use crate::transport::kernel::Kernel;
 use camera::CameraSampler;
 use light::LightStore;
@@ -116,7 +115,6 @@ impl Integrator for Vertices {
         let light_paths = (self.light_paths * context.crop.area() as f32).ceil();
         let rules = Rules {
             world: context.world,
-            guide: &PLAIN,
             sensor: context.sensor,
             connects,
             splats,

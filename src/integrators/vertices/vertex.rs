@@ -2,7 +2,6 @@
 
 use super::mis::{Sum, Turn};
 use crate::shading::bsdf::{Bsdf, Walk};
-use crate::shading::emitters::EmissionGuide;
 use crate::shading::{Address, Sensor, SurfaceClass, SurfacePoint, World};
 use crate::transport::arrival::survival;
 use crate::transport::walk::End;
@@ -17,8 +16,6 @@ const WIDEST: f32 = 0.25;
 pub struct Rules<'a> {
     /// The scene.
     pub world: &'a World,
-    /// Where light paths begin.
-    pub guide: &'a EmissionGuide,
     /// The camera.
     pub sensor: &'a Sensor,
     /// Whether vertices are connected.

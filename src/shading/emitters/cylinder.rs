@@ -139,7 +139,7 @@ impl Cylinder {
         };
         let Some(falloff) = &self.falloff else {
             let normal = s * phi.cos() + t * phi.sin();
-            let direction = Frame::from_normal(normal.as_vec3()).to_world(warp::cosine_hemisphere(v));
+            let direction = self.frame(normal).to_world(warp::cosine_hemisphere(v));
             let area = AreaPdf((1.0 / self.area()) as f32);
             let pdf = area.with_direction(ProjectedPdf(warp::COSINE_HEMISPHERE_PDF));
             return Some(leave(normal, direction, self.radiance, pdf));
@@ -153,6 +153,12 @@ impl Cylinder {
         let normal = front * (1.0 - sin * sin).max(0.0).sqrt() + self.axis.cross(front) * sin;
         let pdf = self.across_pdf(direction, pdf)?;
         (radiance != Vec3::ZERO).then(|| leave(normal, direction, radiance, pdf))
+    }
+
+    /// Around a normal. By the axis, so that normals that differ by rounding have frames that do.
+    fn frame(&self, normal: DVec3) -> Frame {
+        let [s, n] = [self.axis, normal].map(|v| v.as_vec3());
+        Frame { s, t: n.cross(s), n }
     }
 
     /// Density per étendue of a direction of density `pdf` per solid angle and a uniform point of the
@@ -180,7 +186,7 @@ impl Cylinder {
             None => {
                 let (s, t) = self.axis.any_orthonormal_pair();
                 let turn = warp::turn_of(n.dot(s) as f32, n.dot(t) as f32);
-                let local = Frame::from_normal(normal).to_local(direction);
+                let local = self.frame(n).to_local(direction);
                 [Vec2::new(turn, half(along)), warp::square_of_disk(local.truncate())]
             }
             Some(f) => {

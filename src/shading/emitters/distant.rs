@@ -76,11 +76,10 @@ impl Distant {
 
     pub fn from(&self, bounds: &SceneBounds, u: Vec2, v: Vec2) -> FromSample {
         let area = AreaPdf(1.0 / bounds.disk_area());
-        let local = match self.one_minus_cos > 0.0 {
-            true => warp::uniform_cone(v, self.one_minus_cos),
-            false => Vec3::Z,
+        let direction = match self.one_minus_cos > 0.0 {
+            true => -self.frame.to_world(warp::uniform_cone(v, self.one_minus_cos)),
+            false => -self.frame.n,
         };
-        let direction = -self.frame.to_world(local);
         let emission = match self.one_minus_cos > 0.0 {
             true => Emission::Extended {
                 radiance: self.radiance,

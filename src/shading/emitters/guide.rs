@@ -9,7 +9,6 @@
 use super::Emitters;
 use super::sample::EmitterId;
 use crate::math::ONE_MINUS_EPSILON;
-use crate::math::sampler::hash;
 use glam::Vec2;
 
 /// What a ray that leaves an emitter is drawn from.
@@ -42,8 +41,8 @@ pub static PLAIN: EmissionGuide = EmissionGuide { nodes: Vec::new() };
 
 /// Share of the rays that the guide draws.
 const SHARE: f64 = 0.8;
-/// Fewest lessons of a leaf.
-const LEAST: usize = 16;
+/// Fewest lessons of a box that is cut.
+const LEAST: usize = 32;
 /// A leaf of a smaller share of all that was learnt is not cut.
 const SMALLEST: f64 = 1.0 / 4096.0;
 /// Most cuts above a leaf.
@@ -54,19 +53,19 @@ const NARROWEST: f32 = 1.0 / 4096.0;
 #[derive(Clone, Copy, Debug)]
 enum Node {
     /// `first`: share of the first child in what the guide draws here.
-    Inner { cut: Cut, first: f64, second: u32 },
+    Inner { split: Split, first: f64, second: u32 },
     /// The density in it.
     Leaf { relative: f32 },
 }
 
 /// What lies below belongs to the first child.
 #[derive(Clone, Copy, Debug)]
-enum Cut {
+enum Split {
     Emitter(u32),
     Axis { axis: u8, at: f32 },
 }
 
-impl Cut {
+impl Split {
     fn is_first(self, draw: &Draw) -> bool {
         match self {
             Self::Emitter(e) => draw.emitter.0 < e,
@@ -88,11 +87,11 @@ impl Cell {
         Self { emitters: [0, emitters.len() as u32], low: [0.0; 4], size: [1.0; 4] }
     }
 
-    fn children(&self, cut: Cut) -> [Self; 2] {
+    fn children(&self, split: Split) -> [Self; 2] {
         let mut both = [*self; 2];
-        match cut {
-            Cut::Emitter(e) => (both[0].emitters[1], both[1].emitters[0]) = (e, e),
-            Cut::Axis { axis, at } => {
+        match split {
+            Split::Emitter(e) => (both[0].emitters[1], both[1].emitters[0]) = (e, e),
+            Split::Axis { axis, at } => {
                 let a = axis as usize;
                 (both[0].size[a], both[1].size[a]) = (self.size[a] / 2.0, self.size[a] / 2.0);
                 both[1].low[a] = at;
@@ -108,8 +107,8 @@ impl Cell {
         power * self.size.iter().map(|&s| s as f64).product::<f64>()
     }
 
-    /// The cuts that can be made: between emitters where half of the power is, else along every axis that is drawn.
-    fn cuts(&self, emitters: &Emitters) -> impl Iterator<Item = Cut> {
+    /// The splits that can be made: between emitters where half of the power is, and along every axis that is drawn.
+    fn splits(&self, emitters: &Emitters) -> impl Iterator<Item = Split> {
         let [first, end] = self.emitters;
         let half = (emitters.power_before(first) + emitters.power_before(end)) / 2.0;
         let middle = emitters.at_power(half).clamp(first, end - 1);
@@ -117,11 +116,11 @@ impl Cell {
         let nearer = (half - emitters.power_before(middle)).abs();
         let after = (emitters.power_before(middle + 1) - half).abs() < nearer;
         let e = if after { middle + 1 } else { middle };
-        let between = (first < e && e < end).then_some(Cut::Emitter(e));
+        let between = (first < e && e < end).then_some(Split::Emitter(e));
         let drawn = emitters.drawn(first..end);
         let (low, size) = (self.low, self.size);
         let wide = (0..4u8).filter(move |&a| drawn[a as usize / 2] && size[a as usize] > NARROWEST);
-        let along = move |axis: u8| Cut::Axis { axis, at: low[axis as usize] + size[axis as usize] / 2.0 };
+        let along = move |axis: u8| Split::Axis { axis, at: low[axis as usize] + size[axis as usize] / 2.0 };
         between.into_iter().chain(wide.map(along))
     }
 }
@@ -144,32 +143,27 @@ impl EmissionGuide {
         self.nodes.is_empty()
     }
 
-    /// What a ray is drawn from; `u` are five uniform numbers. The emitters' own density of the ray is to be
-    /// multiplied by [`EmissionGuide::relative`].
-    pub fn draw(&self, emitters: &Emitters, u: f32, place: Vec2, direction: Vec2) -> Option<Draw> {
+    /// What a ray is drawn from, by uniform numbers. The emitters' own density of the ray is to be multiplied by
+    /// [`EmissionGuide::relative`].
+    pub fn draw(&self, emitters: &Emitters, u: Vec2, place: Vec2, direction: Vec2) -> Option<Draw> {
         let at = [place.x, place.y, direction.x, direction.y];
-        let plain = |u: f32| Some(Draw { emitter: emitters.select_emission(u)?.0, at });
-        if self.nodes.is_empty() {
-            return plain(u);
+        let guided = u.x as f64 - (1.0 - SHARE);
+        if self.nodes.is_empty() || guided < 0.0 {
+            return Some(Draw { emitter: emitters.select_emission(u.y)?.0, at });
         }
-        let guided = u as f64 - (1.0 - SHARE);
-        if guided < 0.0 {
-            return plain((u / (1.0 - SHARE) as f32).min(ONE_MINUS_EPSILON));
-        }
-        // a deep tree uses up the 24 bits of a unit number: append others
-        let mut u = guided / SHARE + hash(u.to_bits(), 0x9d1e) as f64 * 2f64.powi(-58);
+        let mut choice = guided / SHARE;
         let (mut cell, mut node) = (Cell::whole(emitters), 0);
-        while let Node::Inner { cut, first, second } = self.nodes[node] {
-            let children = cell.children(cut);
-            if u < first {
-                (cell, node, u) = (children[0], node + 1, u / first);
+        while let Node::Inner { split, first, second } = self.nodes[node] {
+            let children = cell.children(split);
+            if choice < first {
+                (cell, node, choice) = (children[0], node + 1, choice / first);
             } else {
-                (cell, node, u) = (children[1], second as usize, (u - first) / (1.0 - first));
+                (cell, node, choice) = (children[1], second as usize, (choice - first) / (1.0 - first));
             }
         }
         let [first, end] = cell.emitters;
         let [low, high] = cell.emitters.map(|e| emitters.power_before(e));
-        let emitter = emitters.at_power(low + (high - low) * u).clamp(first, end - 1);
+        let emitter = emitters.at_power(low + (high - low) * u.y as f64).clamp(first, end - 1);
         let within = |a: usize| (cell.low[a] + cell.size[a] * at[a]).min(ONE_MINUS_EPSILON);
         Some(Draw { emitter: EmitterId(emitter), at: std::array::from_fn(within) })
     }
@@ -182,7 +176,7 @@ impl EmissionGuide {
         let mut node = 0;
         loop {
             match self.nodes[node] {
-                Node::Inner { cut, .. } if cut.is_first(draw) => node += 1,
+                Node::Inner { split, .. } if split.is_first(draw) => node += 1,
                 Node::Inner { second, .. } => node = second as usize,
                 Node::Leaf { relative } => return relative,
             }
@@ -206,38 +200,38 @@ impl Learning<'_> {
     fn grow(&self, nodes: &mut Vec<Node>, lessons: &mut [Lesson], cell: Cell, depth: u32) {
         let share = worth(lessons) / self.total;
         let volume = cell.volume(self.emitters);
-        let is_leaf = lessons.len() < 2 * LEAST || share < SMALLEST || depth == DEPTH;
-        let Some(cut) = (!is_leaf).then(|| self.best_cut(lessons, &cell)).flatten() else {
+        let is_leaf = lessons.len() < LEAST || share < SMALLEST || depth == DEPTH;
+        let Some(split) = (!is_leaf).then(|| self.best_split(lessons, &cell)).flatten() else {
             let guided = if volume > 0.0 { share / volume } else { 0.0 };
             nodes.push(Node::Leaf { relative: (1.0 - SHARE + SHARE * guided) as f32 });
             return;
         };
         let at = nodes.len();
         nodes.push(Node::Leaf { relative: 0.0 });
-        lessons.sort_by_key(|l| !cut.is_first(&l.draw));
-        let (first, second) = lessons.split_at_mut(lessons.partition_point(|l| cut.is_first(&l.draw)));
-        let children = cell.children(cut);
+        lessons.sort_by_key(|l| !split.is_first(&l.draw));
+        let (first, second) = lessons.split_at_mut(lessons.partition_point(|l| split.is_first(&l.draw)));
+        let children = cell.children(split);
         let part = worth(first) / (worth(first) + worth(second));
         self.grow(nodes, first, children[0], depth + 1);
         let behind = nodes.len() as u32;
         self.grow(nodes, second, children[1], depth + 1);
-        nodes[at] = Node::Inner { cut, first: part, second: behind };
+        nodes[at] = Node::Inner { split, first: part, second: behind };
     }
 
-    /// The cut that tells most: whose parts are furthest from having what their volume promises.
-    fn best_cut(&self, lessons: &[Lesson], cell: &Cell) -> Option<Cut> {
+    /// The split that tells most: whose parts are furthest from having what their volume promises.
+    fn best_split(&self, lessons: &[Lesson], cell: &Cell) -> Option<Split> {
         let all = worth(lessons);
         let volume = cell.volume(self.emitters);
-        let gain = |cut: &Cut| {
-            let first = lessons.iter().filter(|l| cut.is_first(&l.draw));
+        let gain = |split: &Split| {
+            let first = lessons.iter().filter(|l| split.is_first(&l.draw));
             let share = first.map(|l| l.worth as f64).sum::<f64>() / all;
-            let expected = cell.children(*cut)[0].volume(self.emitters) / volume;
+            let expected = cell.children(*split)[0].volume(self.emitters) / volume;
             // of the entropy
             let part = |p: f64, q: f64| if p > 0.0 { p * (p / q).ln() } else { 0.0 };
             part(share, expected) + part(1.0 - share, 1.0 - expected)
         };
-        let rated = cell.cuts(self.emitters).map(|cut| (gain(&cut), cut));
-        rated.filter(|(g, _)| g.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, cut)| cut)
+        let rated = cell.splits(self.emitters).map(|split| (gain(&split), split));
+        rated.filter(|(g, _)| g.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, split)| split)
     }
 }
 

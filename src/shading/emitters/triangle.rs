@@ -152,7 +152,7 @@ impl Triangle {
     pub fn square_of(&self, point: Vec3, direction: Vec3) -> [Vec2; 2] {
         let (normal, _) = self.geometry();
         let is_back = self.two_sided && normal.dot(direction) < 0.0;
-        let mut u = warp::square_of_triangle(self.barycentrics(point + normal, -normal.as_dvec3()));
+        let mut u = warp::square_of_triangle(self.barycentrics(point, -normal.as_dvec3()));
         if self.two_sided {
             u.x = 0.5 * if is_back { u.x } else { 1.0 + u.x };
         }
