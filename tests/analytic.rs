@@ -41,9 +41,9 @@ by_methods!(
 
 // light paths alone seldom find what is small in a large scene: closed rooms only
 by_methods!(
-    light r#","integrator":"light","light_paths":2"#,
-    ppm r#","integrator":"ppm","light_paths":2"#,
-    bpm r#","integrator":"bpm","light_paths":2"# =>
+    light r#","integrator":"light","light_paths":8"#,
+    ppm r#","integrator":"ppm","light_paths":4"#,
+    bpm r#","integrator":"bpm","light_paths":4"# =>
     [
         every_camera_sees_the_furnace,
         emissive_meshes_are_lights,
