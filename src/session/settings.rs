@@ -198,7 +198,8 @@ impl Json {
             },
             light_paths: within("light_paths", self.light_paths, 0.0, 64.0)?,
             next_event: self.next_event,
-            emission_guiding: self.emission_guiding,
+            // what bridges bring is not among the lessons
+            emission_guiding: self.emission_guiding && !has_bridges,
             camera_paths: self.camera_paths,
             bridges: has_bridges.then_some(match self.bridges {
                 BridgeName::Uniform => Choice::Uniform,
@@ -220,8 +221,8 @@ const MAX_THREADS: usize = 1024;
 impl Settings {
     /// Paths that are kept at a time, where they may be of any length.
     pub fn kept_paths(&self) -> Option<f32> {
-        use Method::{Mvf, PhotonFilter, Segment, SegmentBridge, SegmentPath};
-        let keeps = matches!(self.method, Segment | SegmentBridge | SegmentPath | Mvf | PhotonFilter);
+        use Method::{Mvf, PhotonFilter, Segment, SegmentPath};
+        let keeps = matches!(self.method, Segment | SegmentPath | Mvf | PhotonFilter);
         let pixels = self.resolution[0] as f32 * self.resolution[1] as f32;
         (keeps && self.max_depth.is_none()).then_some(pixels * self.techniques.light_paths.max(1.0))
     }
