@@ -40,8 +40,8 @@ class Row:
 
     @property
     def is_right(self) -> bool:
-        """Within the tolerance and three standard errors, which are at most half of it each."""
-        sound = math.isfinite(self.got) and self.noise <= max(self.tolerance / 2, 1e-12)
+        """Within the tolerance and three standard errors, each at most 0.7 of it."""
+        sound = math.isfinite(self.got) and self.noise <= max(0.7 * self.tolerance, 1e-12)
         return sound and self.refused == 0 and abs(self.off) <= self.tolerance + 3 * self.noise
 
 

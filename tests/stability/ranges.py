@@ -33,7 +33,7 @@ def down(at: list[float], size: float = 1.0) -> np.ndarray:
 @case(GROUP, "the scene at scale 1, at the origin, with the same seeds")
 def places(full: bool) -> Rows:
     """The same scene, scaled, and moved away from the origin."""
-    side, samples, seeds = (32, 32, 6) if full else (24, 16, 6)
+    side, samples, seeds = (32, 32, 6) if full else (24, 48, 6)
     reference = still().means(side, samples, seeds)
 
     def off(what: str, s: Stage) -> Rows:
@@ -166,7 +166,7 @@ def footprints(full: bool) -> Rows:
     s.floor(1.0, DIFFUSE)
     s.light("dome", radiance=[1, 1, 1])
     s.camera([0, 0, 5], [0, 0, 0], 0.5, type="orthographic")
-    yield row("orthographic, open floor", 0.5, s.means(24, 16, 6), 0.01)
+    yield row("orthographic, open floor", 0.5, s.means(24, 48, 6), 0.01)
     s = Stage()
     s.floor(1e6, DIFFUSE)
     s.light("dome", radiance=[1, 1, 1])
