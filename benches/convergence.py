@@ -46,7 +46,7 @@ def halved(made: Path, into: Path) -> tuple[int, int]:
 
 def reference(stage: Path, resolution: tuple[int, int], into: Path) -> None:
     """Writes a reference, and says how well two halves of it agree."""
-    scene = usd.load(stage).scene
+    scene = usd.load(stage, resolution=resolution).scene
     renders = []
     until = time.monotonic() + REFERENCE_SECONDS
     while time.monotonic() < until or len(renders) < 2:

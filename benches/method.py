@@ -108,6 +108,12 @@ def consistency(seeds: int = 4, samples: int = 12) -> None:
                 print(json.dumps(row), flush=True)
 
 
+def means(scene: Any, seeds: int, **settings: Any) -> np.ndarray:
+    """Means of pictures, one for every seed."""
+    pictures = (render(scene, seed=1000 * seed, **settings)[0] for seed in range(seeds))
+    return np.array([picture.mean(dtype=float) for picture in pictures])
+
+
 def gallery(seeds: int = 6, samples: int = 96) -> None:
     """Means of the gallery's scenes by size of a fixed kernel, beside an unbiased method, as JSON lines.
 
@@ -121,18 +127,11 @@ def gallery(seeds: int = 6, samples: int = 96) -> None:
         small = {"integrator": unbiased, "kernel_size": 0.5}
         common = {"resolution": [128, 72], "samples": samples, "kernel": "fixed"}
 
-        def means(
-            settings: dict[str, Any], scene: Any = scene, common: Any = common
-        ) -> Any:
-            pictures = (
-                render(scene, seed=1000 * seed, **common, **settings)[0]
-                for seed in range(seeds)
-            )
-            return np.array([picture.mean(dtype=float) for picture in pictures])
-
-        expected = means(small)
+        expected = means(scene, seeds, **common, **small)
         for what, settings in kernels.items():
-            off = (means(settings) - expected) / expected.mean()
+            off = (
+                means(scene, seeds, **common, **settings) - expected
+            ) / expected.mean()
             error = off.std(ddof=1) / seeds**0.5
             row = {
                 "scene": name,

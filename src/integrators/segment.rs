@@ -4,6 +4,7 @@ use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::{Pass, Sample, SplatBuffer};
 use crate::math::sampler::hash;
 use crate::math::{LUMINANCE, Sampler, luminance};
+use crate::shading::World;
 use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
@@ -32,13 +33,26 @@ const GRID_STREAM: u32 = 0x961d_0000;
 /// Keeps those of bridges apart.
 const BRIDGE_STREAM: u32 = 0xb21d_9e00;
 
+/// What an iteration samples, and how it is clustered.
+#[derive(Debug, Default)]
+struct Samples {
+    camera: CameraStore,
+    light: LightStore,
+    clusters: Clusters,
+}
+
+impl Samples {
+    /// With the scene, and the bridges if there are any.
+    fn with<'a>(&'a self, world: &'a World, bridges: Option<&'a Bridges>) -> Sampled<'a> {
+        Sampled { world, camera: &self.camera, light: &self.light, clusters: &self.clusters, bridges }
+    }
+}
+
 /// Segment-based light transport. Its stores are kept from one iteration to the next.
 #[derive(Debug, Default)]
 pub struct Segment {
     techniques: Techniques,
-    camera: CameraStore,
-    light: LightStore,
-    clusters: Clusters,
+    samples: Samples,
     bridges: Bridges,
     splats: SplatBuffer,
     weights: Weights,
@@ -71,7 +85,9 @@ impl Integrator for Segment {
             true => {
                 self.gather(context);
                 costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-                if self.techniques.emission_guiding && self.guiding.is_wanted(self.light.starts.len()) {
+                if self.techniques.emission_guiding
+                    && self.guiding.finish_iteration(self.samples.light.starts.len())
+                {
                     let bytes = self.learn(context, &cut);
                     costs.stage("guiding", bytes);
                 }
@@ -97,27 +113,27 @@ impl Segment {
         if !self.sample_light(context, index, light_paths as u32, cut) {
             return false;
         }
-        costs.stage("sampling", self.camera.bytes() + self.light.bytes());
+        costs.stage("sampling", self.samples.camera.bytes() + self.samples.light.bytes());
 
         let edge = self.techniques.kernel.edge(context.completed);
         let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index));
-        let all = Numbered { camera: &self.camera.arrivals, light: &self.light.arrivals };
-        if !self.clusters.group(world, &grid, all, cut) {
+        let all = Numbered { camera: &self.samples.camera.arrivals, light: &self.samples.light.arrivals };
+        if !self.samples.clusters.group(world, &grid, all, cut) {
             return false;
         }
-        costs.stage("clustering", self.clusters.bytes());
+        costs.stage("clustering", self.samples.clusters.bytes());
         let areas = match self.techniques.estimator {
             _ if light_paths == 0.0 => Areas::None,
             Estimator::LeaveOneOut | Estimator::WholePath => Areas::OfPhotons,
             Estimator::Literal => Areas::True,
         };
-        if !self.clusters.measure(world, &grid, all, areas, cut) {
+        if !self.samples.clusters.measure(world, &grid, all, areas, cut) {
             return false;
         }
         costs.stage("areas", 0);
         self.octaves.clear();
         self.octaves.extend(self.primaries.iter().map(|p| match p.arrival {
-            Some(a) => grid.octaves(self.camera.arrivals[a as usize].position),
+            Some(a) => grid.octaves(self.samples.camera.arrivals[a as usize].position),
             None => 0.0,
         }));
         context.counters.segments.store(self.segments() as u64, Relaxed);
@@ -128,13 +144,7 @@ impl Segment {
             }
             costs.stage("bridges", self.bridges.bytes() + self.splats.bytes());
         }
-        let sampled = Sampled {
-            world,
-            camera: &self.camera,
-            light: &self.light,
-            clusters: &self.clusters,
-            bridges: self.techniques.bridges.map(|_| &self.bridges),
-        };
+        let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
         if !self.weights.weigh(sampled, self.techniques.estimator, cut) {
             return false;
         }
@@ -166,7 +176,7 @@ impl Segment {
             self.light_is_idle = self.reflected.photon_share() / share < WORTHWHILE;
         }
         costs.stage("propagation", self.reflected.bytes());
-        context.counters.dropped.fetch_add(self.camera.dropped, Relaxed);
+        context.counters.dropped.fetch_add(self.samples.camera.dropped, Relaxed);
         // figures that hardly change are taken ever more rarely
         if solved && (index + 1).is_power_of_two() {
             let report = self.reflected.report(sampled, &self.weights, cut);
@@ -194,11 +204,11 @@ impl Segment {
         if cut.is_raised() {
             return false;
         }
-        self.camera.clear();
+        self.samples.camera.clear();
         self.primaries.clear();
         self.starts.clear();
         for (mut store, primaries) in rows {
-            let first = self.camera.append(&mut store);
+            let first = self.samples.camera.append(&mut store);
             for mut p in primaries {
                 p.arrival = p.arrival.map(|a| a + first);
                 self.starts.extend(p.arrival);
@@ -221,16 +231,15 @@ impl Segment {
             // an iteration are not: given one photon, fewer others lie nearby. They are from iteration to iteration.
             sampler.path(k, &mut Sampler::new(context.seed ^ LIGHT_STREAM, k, index), store, rays);
         });
-        self.light.clear();
-        batches.into_iter().for_each(|mut store| self.light.append(&mut store));
+        self.samples.light.clear();
+        batches.into_iter().for_each(|mut store| self.samples.light.append(&mut store));
         !cut.is_raised()
     }
 
     /// Bridges between what was sampled and clustered, and what they send to the lens.
     fn sample_bridges(&mut self, context: &Context, index: u32, choice: Choice, cut: &Cut) -> bool {
         let Context { world, sensor, filter, crop, max_depth, .. } = *context;
-        let Self { camera, light, clusters, .. } = self;
-        let sampled = Sampled { world, camera, light, clusters, bridges: None };
+        let sampled = self.samples.with(world, None);
         let mut seen = vec![0.0; sampled.camera.arrivals.len()];
         for p in self.primaries.iter().filter(|p| p.passages == 0) {
             if let Some(a) = p.arrival {
@@ -260,32 +269,20 @@ impl Segment {
             Some(Start { arrival: p.arrival?, passages: p.passages, worth })
         });
         let starts: Vec<Start> = starts.collect();
-        let sampled = Sampled {
-            world: context.world,
-            camera: &self.camera,
-            light: &self.light,
-            clusters: &self.clusters,
-            bridges: self.techniques.bridges.map(|_| &self.bridges),
-        };
+        let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
         let (weights, reflected, max_depth) = (&self.weights, &self.reflected, context.max_depth);
         self.guiding.learn(Outcome { sampled, weights, reflected, starts: &starts, max_depth }, cut)
     }
 
     /// Segments of this iteration.
     fn segments(&self) -> usize {
-        self.camera.segments(self.primaries.len()) + self.light.arrivals.len()
+        self.samples.camera.segments(self.primaries.len()) + self.samples.light.arrivals.len()
     }
 
     /// One sample for every pixel.
     fn gather(&self, context: &Context) {
         let width = context.crop.width as usize;
-        let sampled = Sampled {
-            world: context.world,
-            camera: &self.camera,
-            light: &self.light,
-            clusters: &self.clusters,
-            bridges: self.techniques.bridges.map(|_| &self.bridges),
-        };
+        let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
         context.film.add_iteration(|x, y| {
             let pixel = y as usize * width + x as usize;
             let (p, splatted) = (&self.primaries[pixel], self.splats.get(pixel));

@@ -26,11 +26,11 @@ pub fn square_of_disk(d: Vec2) -> Vec2 {
         false if r > 0.0 => Vec2::new(r.copysign(d.y) / FRAC_PI_4 * (d.x / d.y).atan(), r.copysign(d.y)),
         false => Vec2::ZERO,
     };
-    unit((o + 1.0) / 2.0)
+    in_unit_square((o + 1.0) / 2.0)
 }
 
-/// Kept inside of the unit square, which rounding may leave.
-fn unit(u: Vec2) -> Vec2 {
+/// Kept inside of the half open unit square, which rounding may leave.
+pub fn in_unit_square(u: Vec2) -> Vec2 {
     u.clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON))
 }
 
@@ -59,7 +59,7 @@ pub fn uniform_sphere(u: Vec2) -> Vec3 {
 
 /// The point of the unit square that [`uniform_sphere`] takes to `d`.
 pub fn square_of_sphere(d: Vec3) -> Vec2 {
-    unit(Vec2::new((1.0 - d.z) / 2.0, turn_of(d.x, d.y)))
+    in_unit_square(Vec2::new((1.0 - d.z) / 2.0, turn_of(d.x, d.y)))
 }
 
 /// Uniform direction of the cone around +z whose half angle has `1 - cos` equal to
@@ -76,7 +76,7 @@ pub fn square_of_cone(d: Vec3, one_minus_cos: f32) -> Vec2 {
     let sin2 = d.x * d.x + d.y * d.y;
     // 1 - cos without its cancellation
     let h = if d.z > 0.0 { sin2 / (1.0 + d.z) } else { 1.0 - d.z };
-    unit(Vec2::new(h / one_minus_cos, turn_of(d.x, d.y)))
+    in_unit_square(Vec2::new(h / one_minus_cos, turn_of(d.x, d.y)))
 }
 
 /// Solid angle of the cone of [`uniform_cone`]; its density is the inverse.
@@ -99,7 +99,7 @@ pub fn uniform_triangle(u: Vec2) -> Vec2 {
 
 /// The point of the unit square that [`uniform_triangle`] takes to `b`.
 pub fn square_of_triangle(b: Vec2) -> Vec2 {
-    unit(match b.y > b.x {
+    in_unit_square(match b.y > b.x {
         true => Vec2::new(2.0 * b.x, b.x + b.y),
         false => Vec2::new(b.x + b.y, 2.0 * b.y),
     })

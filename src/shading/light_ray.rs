@@ -6,6 +6,7 @@ use super::surface::{normalize_any, place};
 use super::texture::MeshPoint;
 use super::world::World;
 use crate::accel::Ray;
+use crate::math::Sampler;
 use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
 use glam::{Vec2, Vec2Swizzles, Vec3};
 
@@ -36,16 +37,12 @@ pub enum SourceDensity {
 }
 
 impl World {
-    /// Draws the first ray of a light path, by power and by what the guide has learnt. Of the uniform numbers, `u`
-    /// chooses the emitter.
-    pub fn sample_emission(
-        &self,
-        guide: &EmissionGuide,
-        u: Vec2,
-        place_u: Vec2,
-        direction_u: Vec2,
-    ) -> Option<LightRay> {
-        let draw = guide.draw(&self.emitters, u, place_u, direction_u)?;
+    /// Draws the first ray of a light path, by power and by what the guide has learnt.
+    pub fn sample_emission(&self, guide: &EmissionGuide, sampler: &mut Sampler) -> Option<LightRay> {
+        let (emitter, place_u, direction_u) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
+        // a guide makes one choice more
+        let choice = if guide.is_empty() { 0.0 } else { sampler.next_1d() };
+        let draw = guide.draw(&self.emitters, Vec2::new(choice, emitter), place_u, direction_u)?;
         let (id, [x, y, z, w]) = (draw.emitter, draw.at);
         let factor = self.emitters.emission_probability(id).0 * guide.relative(&draw);
         let s = self.emitters.sample_from(id, Vec2::new(x, y), Vec2::new(z, w))?;

@@ -58,10 +58,10 @@ pub struct Outcome<'a> {
 }
 
 impl Guiding {
-    /// An iteration, with so many light paths that arrived, is over: whether it has something to teach. The guide changes
-    /// after the first, and whenever the number of iterations has doubled; the last ones before teach it, as many
-    /// as are needed.
-    pub fn is_wanted(&mut self, paths: usize) -> bool {
+    /// An iteration, with so many light paths that arrived, is over: says whether it has something to teach. The guide
+    /// changes after the first, and whenever the number of iterations has doubled; the last ones before teach
+    /// it, as many as are needed.
+    pub fn finish_iteration(&mut self, paths: usize) -> bool {
         self.iterations += 1;
         let left = self.iterations.next_power_of_two() - self.iterations;
         paths > 0 && left < LAST && left as usize * paths < MOST

@@ -8,7 +8,7 @@ use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
 use crate::shading::emitters::EmissionGuide;
 use crate::shading::{LightRay, Piece, SourceDensity, SurfaceClass, World};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// Samples light paths.
 pub struct LightSampler<'a> {
@@ -27,11 +27,7 @@ pub struct LightSampler<'a> {
 impl LightSampler<'_> {
     /// Samples path number `path` into the store. Adds the rays it takes to `rays`.
     pub fn path(&self, path: u32, sampler: &mut Sampler, store: &mut LightStore, rays: &mut u64) {
-        let (emitter, place, direction) = (sampler.next_1d(), sampler.next_2d(), sampler.next_2d());
-        // a guide makes one choice more
-        let choice = if self.guide.is_empty() { 0.0 } else { sampler.next_1d() };
-        let u = Vec2::new(choice, emitter);
-        let Some(ray) = self.world.sample_emission(self.guide, u, place, direction) else { return };
+        let Some(ray) = self.world.sample_emission(self.guide, sampler) else { return };
         let follow = Follow { world: self.world, walk: Walk::Light, from_camera: false };
         let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
         let Some(mut end) = end else { return };

@@ -45,9 +45,14 @@ pub fn room(wall: &str) -> World {
     World::new(Arc::new(b.build().unwrap()), false).unwrap()
 }
 
+/// The room's camera.
+pub fn sensor() -> Sensor {
+    Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40)
+}
+
 /// Clusters of these arrivals in that room.
 pub fn clustered(world: &World, camera: &CameraStore, light: &LightStore, areas: Areas) -> Clusters {
-    let sensor = Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40);
+    let sensor = sensor();
     let grid = Grid::new(&sensor, 4.0, 3);
     let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
     let mut clusters = Clusters::default();

@@ -24,13 +24,28 @@ fn triangle(two_sided: bool) -> MeshTriangle {
     MeshTriangle { instance: 0, triangle: 0, vertices, radiance: Vec3::ONE, two_sided }
 }
 
+/// A ray that leaves an emitter at a point.
+fn left(emitter: EmitterId, point: Vec3, normal: Vec3) -> EmitterHit {
+    EmitterHit { emitter, distance: 1.0, point, normal, radiance: Vec3::ONE }
+}
+
+/// Where a ray meets a light first.
+fn met(e: &Emitters, origin: Vec3, direction: Vec3) -> EmitterHit {
+    let mut nearest: Option<EmitterHit> = None;
+    e.for_each_hit(origin, direction, f32::INFINITY, |hit| {
+        if nearest.is_none_or(|n| hit.distance < n.distance) {
+            nearest = Some(hit);
+        }
+    });
+    nearest.expect("the ray leads to the light")
+}
+
 /// What a ray was drawn from, told from the ray alone.
 fn told(e: &Emitters, id: EmitterId, place: Vec2, direction: Vec2) -> Option<Draw> {
     let s = e.sample_from(id, place, direction)?;
     // of a light at infinity, the ray may be met anywhere
     let point = if e.is_infinite(id) { s.origin + s.direction * 2.3 } else { s.origin };
-    let hit = EmitterHit { emitter: id, distance: 1.0, point, normal: s.normal, radiance: Vec3::ONE };
-    Some(e.draw_of(s.direction, &hit))
+    Some(e.draw_of(s.direction, &left(id, point, s.normal)))
 }
 
 /// `drawn`: whether the place and the direction of a ray matter.
@@ -129,15 +144,9 @@ fn light_that_is_met_and_light_that_is_sampled_tell_the_same() {
                 let s = e.sample_from(FIRST, u, v).unwrap();
                 let own = told(&e, FIRST, u, v).unwrap();
                 let eye = s.origin + s.direction * 2.0;
-                let mut nearest: Option<EmitterHit> = None;
-                e.for_each_hit(eye, -s.direction, f32::INFINITY, |hit| {
-                    if nearest.is_none_or(|n| hit.distance < n.distance) {
-                        nearest = Some(hit);
-                    }
-                });
                 // grazing rays magnify rounding
                 if s.direction.dot(s.normal) > 0.1 {
-                    let hit = nearest.expect("the ray goes back to the light");
+                    let hit = met(&e, eye, -s.direction);
                     assert_near(&json, &e.draw_of(s.direction, &hit), &own, 2e-3);
                     checked += 1;
                 }
@@ -145,22 +154,9 @@ fn light_that_is_met_and_light_that_is_sampled_tell_the_same() {
                 if let Some(t) = e.sample_towards(FIRST, &receiver, u)
                     && t.direction.dot(t.normal) < -0.1
                 {
-                    let hit = |point: Vec3, normal: Vec3| EmitterHit {
-                        emitter: FIRST,
-                        distance: t.distance,
-                        point,
-                        normal,
-                        radiance: Vec3::ONE,
-                    };
-                    let sampled = e.draw_of(-t.direction, &hit(t.point, t.normal));
-                    let mut nearest: Option<EmitterHit> = None;
-                    e.for_each_hit(eye, t.direction, f32::INFINITY, |hit| {
-                        if nearest.is_none_or(|n| hit.distance < n.distance) {
-                            nearest = Some(hit);
-                        }
-                    });
-                    let met = nearest.expect("the light is where it was sampled");
-                    assert_near(&json, &e.draw_of(-t.direction, &met), &sampled, 2e-3);
+                    let sampled = e.draw_of(-t.direction, &left(FIRST, t.point, t.normal));
+                    let hit = met(&e, eye, t.direction);
+                    assert_near(&json, &e.draw_of(-t.direction, &hit), &sampled, 2e-3);
                 }
             }
             assert!(checked > 300, "{json}: {checked}");
@@ -168,13 +164,7 @@ fn light_that_is_met_and_light_that_is_sampled_tell_the_same() {
         let beam = format!(r#"{{"type":"distant","irradiance":[1,1,1],"transform":{m}}}"#);
         let e = emitters_of(&[&beam], &[], &[]);
         let receiver = Receiver { position: Vec3::new(0.3, -0.5, 0.8), normal: None };
-        let at = |direction: Vec3| {
-            let (distance, point) = (f32::INFINITY, receiver.position);
-            e.draw_of(
-                direction,
-                &EmitterHit { emitter: FIRST, distance, point, normal: direction, radiance: Vec3::ONE },
-            )
-        };
+        let at = |direction: Vec3| e.draw_of(direction, &left(FIRST, receiver.position, direction));
         let from = e.sample_from(FIRST, Vec2::ZERO, Vec2::ZERO).unwrap().direction;
         let towards = e.sample_towards(FIRST, &receiver, Vec2::ZERO).unwrap().direction;
         assert_near(&beam, &at(from), &at(-towards), 1e-5);

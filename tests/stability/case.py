@@ -40,8 +40,8 @@ class Row:
 
     @property
     def is_right(self) -> bool:
-        """Within the tolerance and three standard errors, each at most 0.7 of it."""
-        sound = math.isfinite(self.got) and self.noise <= max(0.7 * self.tolerance, 1e-12)
+        """Within the tolerance and three standard errors, each at most half of it."""
+        sound = math.isfinite(self.got) and self.noise <= max(self.tolerance / 2, 1e-12)
         return sound and self.refused == 0 and abs(self.off) <= self.tolerance + 3 * self.noise
 
 
@@ -89,13 +89,11 @@ def row(
     return Row(parameter, expected, got.mean, got.error, tolerance, got.refused, at, line)
 
 
-def beside(
-    parameter: str, reference: Means, got: Means, tolerance: float, at: float | None = None
-) -> Row:
+def beside(parameter: str, reference: Means, got: Means, tolerance: float) -> Row:
     """A row whose right value is another measurement with seeds of its own."""
     error = math.hypot(reference.error, got.error)
     refused = got.refused + reference.refused
-    return Row(parameter, reference.mean, got.mean, error, tolerance, refused, at)
+    return Row(parameter, reference.mean, got.mean, error, tolerance, refused)
 
 
 def exact(parameter: str, expected: float, got: float, tolerance: float = 0.0) -> Row:

@@ -13,6 +13,8 @@ import segue
 Vector = Sequence[float]
 
 DIFFUSE = {"type": "diffuse", "color": 0.5}
+#: For pictures of few pixels, in which a kernel of the usual size is a large part of the scene.
+SHARP = {"kernel": "fixed", "kernel_size": 0.5}
 
 
 def look(eye: Vector, target: Vector) -> np.ndarray:

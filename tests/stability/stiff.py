@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from case import Rows, case, row
-from stage import Stage, icosphere
+from stage import SHARP, Stage, icosphere
 
 GROUP = "Stiff"
-#: For pictures of so few pixels, in which a kernel of the usual size is a large part of the scene.
-SHARP = {"kernel": "fixed", "kernel_size": 0.5}
 
 
 def furnace(albedo: float) -> Stage:

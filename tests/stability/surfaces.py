@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from case import Rows, beside, case, exact, row
-from stage import DIFFUSE, Stage
+from stage import DIFFUSE, SHARP, Stage
 
 GROUP = "Surfaces"
-SHARP = {"kernel": "fixed", "kernel_size": 0.5}
 
 
 def ball(surface: dict) -> Stage:

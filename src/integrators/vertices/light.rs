@@ -72,10 +72,7 @@ fn vertices(
     rays: &mut u64,
 ) {
     let world = rules.world;
-    // without a guide only the second number counts
-    let u = Vec2::new(0.0, sampler.next_1d());
-    let (place, direction) = (sampler.next_2d(), sampler.next_2d());
-    let Some(ray) = world.sample_emission(&PLAIN, u, place, direction) else { return };
+    let Some(ray) = world.sample_emission(&PLAIN, sampler) else { return };
     let follow = Follow { world, walk: Walk::Light, from_camera: false };
     let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
     let Some(mut end) = end else { return };

@@ -4,7 +4,7 @@ use super::bounds::{Cone, LightBounds};
 use super::falloff::Falloff;
 use super::sample::{Emission, FromSample, SurfacePoint};
 use crate::math::density::{AreaPdf, EtenduePdf, ProjectedPdf, SolidAnglePdf};
-use crate::math::{Frame, ONE_MINUS_EPSILON, luminance, warp};
+use crate::math::{Frame, luminance, warp};
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -181,18 +181,18 @@ impl Cylinder {
     pub fn square_of(&self, point: Vec3, normal: Vec3, direction: Vec3) -> [Vec2; 2] {
         let (n, d) = (normal.as_dvec3(), direction.as_dvec3());
         let along = (point.as_dvec3() - self.center).dot(self.axis) / self.half_length;
-        let half = |t: f64| (((t + 1.0) / 2.0) as f32).clamp(0.0, ONE_MINUS_EPSILON);
+        let half = |t: f64| ((t + 1.0) / 2.0) as f32;
         match &self.falloff {
             None => {
                 let (s, t) = self.axis.any_orthonormal_pair();
                 let turn = warp::turn_of(n.dot(s) as f32, n.dot(t) as f32);
                 let local = self.frame(n).to_local(direction);
-                [Vec2::new(turn, half(along)), warp::square_of_disk(local.truncate())]
+                [warp::in_unit_square(Vec2::new(turn, half(along))), warp::square_of_disk(local.truncate())]
             }
             Some(f) => {
                 let front = (d - self.axis * d.dot(self.axis)).normalize_or_zero();
                 let sin = self.axis.cross(front).dot(n);
-                [Vec2::new(half(sin), half(along)), f.square_of(direction)]
+                [warp::in_unit_square(Vec2::new(half(sin), half(along))), f.square_of(direction)]
             }
         }
     }

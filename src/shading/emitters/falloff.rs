@@ -1,6 +1,6 @@
 //! Directional fall-off of emission around an axis, and its importance sampling.
 
-use crate::math::{Frame, ONE_MINUS_EPSILON, warp};
+use crate::math::{Frame, warp};
 use crate::scene::light::{Profile, Shaping};
 use glam::{Vec2, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -165,7 +165,7 @@ impl Falloff {
         // 1 - cos^k, from the sine where that is exact
         let within = if local.z > 0.0 { -(0.5 * k * (-sin2).ln_1p()).exp_m1() } else { 1.0 };
         let u = (within / covered(k, cutoff)) as f32;
-        Vec2::new(u.clamp(0.0, ONE_MINUS_EPSILON), warp::turn_of(local.x, local.y))
+        warp::in_unit_square(Vec2::new(u, warp::turn_of(local.x, local.y)))
     }
 
     /// Integral of the factor over all solid angles, sr.

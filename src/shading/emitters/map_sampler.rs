@@ -1,6 +1,6 @@
 //! Images as emitters: bilinear lookup, and sampling in proportion to it.
 
-use crate::math::{ONE_MINUS_EPSILON, luminance};
+use crate::math::{ONE_MINUS_EPSILON, luminance, warp};
 use crate::scene::Image;
 use glam::{DVec3, Vec2, Vec3};
 use half::bf16;
@@ -232,7 +232,7 @@ impl MapSampler {
             u.y = unchoose(row(y0), row(y0 + 1), odd[1], u.y);
             (x, y) = (x / 2, y / 2);
         }
-        u.clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON))
+        warp::in_unit_square(u)
     }
 
     /// What [`MapSampler::row_point`] takes to a coordinate within row `y`.

@@ -7,7 +7,7 @@ use super::plane::{Plane, flat_integral, leave, leave_pdf, leave_square};
 use super::sample::{FromSample, SurfacePoint};
 use super::spherical_rect::SphericalRect;
 use crate::math::density::{AreaPdf, EtenduePdf, SolidAnglePdf};
-use crate::math::{ONE_MINUS_EPSILON, luminance};
+use crate::math::{luminance, warp};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// A parallelogram that emits from one side.
@@ -160,7 +160,7 @@ impl Rect {
 
     /// The numbers from which [`Rect::from`] draws a ray.
     pub fn square_of(&self, point: Vec3, direction: Vec3) -> [Vec2; 2] {
-        let at = to_image(self.plane.coordinates(point)).clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON));
+        let at = warp::in_unit_square(to_image(self.plane.coordinates(point)));
         let place = self.map.as_ref().map_or(at, |m| m.square_of(at));
         [place, leave_square(self.plane.normal, self.falloff.as_ref(), direction)]
     }

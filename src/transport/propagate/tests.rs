@@ -2,20 +2,19 @@
 
 use super::*;
 use crate::math::{Sampler, warp};
-use crate::scene::Camera;
 use crate::shading::emitters::PLAIN;
-use crate::shading::{CameraRay, Sensor, World};
+use crate::shading::{CameraRay, World};
 use crate::transport::Estimator;
 use crate::transport::camera::CameraSampler;
 use crate::transport::cluster::Areas;
 use crate::transport::light::LightSampler;
 use crate::transport::store::{CameraStore, LightStore};
-use crate::transport::testing::{ON, clustered, room};
+use crate::transport::testing::{ON, clustered, room, sensor};
 
 /// Paths of both sides in a glowing room.
 fn sampled(world: &World, seed: u32, camera_paths: u32, light_paths: u32) -> (CameraStore, LightStore) {
     let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
-    let sensor = Sensor::new(&Camera::from_json("camera", r#"{"window":[-1,1,-1,1]}"#).unwrap(), 40, 40);
+    let sensor = sensor();
     let sampler = CameraSampler {
         world,
         sensor: &sensor,
