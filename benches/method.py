@@ -3,7 +3,7 @@
 Needs the scenes and references that are shared between renderers (SEGUE_SHARED, or ../shared beside the
 checkout); without them it says so and does nothing. `gallery` needs none of it, nor does `pictures`, but what
 `cargo test --release --test method_pictures -- --ignored` draws. Run:
-.venv/bin/python benches/method.py table|consistency|gallery|plot|pictures
+.venv/bin/python benches/method.py table|consistency|gallery [SCENE ...]|plot|pictures
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from segue import Render, images, metrics, usd
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers"
 SCENES = ("cornell", "cornell_glass", "ajar_door", "glossy_box", "lamp", "furnace")
-#: Scenes of the gallery, and an unbiased method (or one whose bias is least) that finds their light.
+#: Scenes of the gallery, an unbiased method (or one whose bias is least) that finds their light, samples a pixel, and
+#: light paths for each camera path: many where a sun's photons are few in pixels of so small a picture.
 GALLERY = {
-    "door_ajar": "bdpt",
-    "glass_caustic": "vcm",
-    "glossy_room": "bdpt",
-    "lamp": "vcm",
-    "night_market": "path",
-    "pool": "vcm",
-    "still_life": "path",
+    "door_ajar": ("bdpt", 96, 1),
+    "glass_caustic": ("vcm", 256, 16),
+    "glossy_room": ("bdpt", 96, 1),
+    "lamp": ("vcm", 96, 1),
+    "night_market": ("path", 96, 1),
+    "pool": ("vcm", 96, 8),
+    "still_life": ("path", 96, 1),
 }
 PICTURES = ROOT / "docs" / "pictures"
 #: Relative noise of the references' means, as far as other renderers tell.
@@ -114,18 +115,24 @@ def means(scene: Any, seeds: int, **settings: Any) -> np.ndarray:
     return np.array([picture.mean(dtype=float) for picture in pictures])
 
 
-def gallery(seeds: int = 6, samples: int = 96) -> None:
+def gallery(seeds: int = 6) -> None:
     """Means of the gallery's scenes by size of a fixed kernel, beside an unbiased method, as JSON lines.
 
     All methods take the same camera samples for a seed, so what camera rays see straight or through glass (glints of
     the sun, mostly) has no part in the differences, whose standard errors are printed.
     """
-    for name, unbiased in GALLERY.items():
+    for name in sys.argv[2:] or GALLERY:
+        unbiased, samples, light_paths = GALLERY[name]
         scene = usd.load(ROOT / "scenes" / f"{name}.usda").scene
         kernels = {f"segment {s:g} px": {"kernel_size": s} for s in SIZES}
         # the disks of `vcm` lose light at edges: small ones
         small = {"integrator": unbiased, "kernel_size": 0.5}
-        common = {"resolution": [128, 72], "samples": samples, "kernel": "fixed"}
+        common = {
+            "resolution": [128, 72],
+            "samples": samples,
+            "kernel": "fixed",
+            "light_paths": light_paths,
+        }
 
         expected = means(scene, seeds, **common, **small)
         for what, settings in kernels.items():

@@ -44,8 +44,10 @@ impl StopSign {
 pub struct Counters {
     /// Rays traced, shadow rays included.
     pub rays: AtomicU64,
-    /// Segments of the last iteration, where there are any.
+    /// Most segments of an iteration, where there are any.
     pub segments: AtomicU64,
+    /// What turned out not to pay and is left out, where an integrator looks.
+    pub left_out: Mutex<Option<String>>,
     /// Contributions of segments that were not finite and were dropped.
     pub dropped: AtomicU64,
     /// The graph of the segment method, from the last iteration in which it was looked at.

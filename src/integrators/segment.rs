@@ -8,6 +8,7 @@ use crate::shading::World;
 use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
+use crate::transport::economy::Economy;
 use crate::transport::grid::Grid;
 use crate::transport::guiding::{Guiding, Outcome, Start};
 use crate::transport::light::LightSampler;
@@ -19,11 +20,6 @@ use glam::Vec3;
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Share of the light below which photons do not pay, as a mean over all arrivals: a caustic on a few hundredths of
-/// the picture is above it.
-const WORTHWHILE: f64 = 2e-3;
-/// Share of the light paths that is still sampled then.
-const IDLE: f32 = 1.0 / 16.0;
 /// Of the picture's mean brightness, what is added to that of a pixel where shares of it are judged.
 const DARK: f32 = 0.1;
 /// Keeps the random numbers of light paths apart from those of pixels.
@@ -64,8 +60,8 @@ pub struct Segment {
     octaves: Vec<f32>,
     /// First arrival of every camera path that has one.
     starts: Vec<u32>,
-    /// Whether light paths turned out to bring next to nothing, so that only a few are sampled, to look again.
-    light_is_idle: bool,
+    /// How many light paths pay.
+    economy: Economy,
 }
 
 impl Segment {
@@ -73,6 +69,11 @@ impl Segment {
     pub fn new(techniques: Techniques) -> Self {
         Self { techniques, ..Self::default() }
     }
+}
+
+/// Light paths of an iteration, of which there are so many for each camera path.
+fn light_paths(per_camera_path: f32, context: &Context) -> f32 {
+    (per_camera_path * context.crop.area() as f32).ceil()
 }
 
 impl Integrator for Segment {
@@ -85,11 +86,8 @@ impl Integrator for Segment {
             true => {
                 self.gather(context);
                 costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-                if self.techniques.emission_guiding
-                    && self.guiding.finish_iteration(self.samples.light.starts.len())
-                {
-                    let bytes = self.learn(context, &cut);
-                    costs.stage("guiding", bytes);
+                if let Some(bytes) = self.learn(context, index, &cut) {
+                    costs.stage("learning", bytes);
                 }
                 IterationEnd::Complete
             }
@@ -105,8 +103,11 @@ impl Segment {
     /// All stages up to the film. Returns `false` if it was stopped.
     fn transport(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
         let Context { world, sensor, .. } = *context;
-        let per_camera_path = self.techniques.light_paths * if self.light_is_idle { IDLE } else { 1.0 };
-        let light_paths = (per_camera_path * context.crop.area() as f32).ceil();
+        let all = light_paths(self.techniques.light_paths, context);
+        let light_paths = match self.is_thrifty(context) {
+            true => self.economy.light_paths(all, index, world.has_hidden_light()),
+            false => all,
+        };
         if !self.sample_camera(context, index, light_paths, cut) {
             return false;
         }
@@ -136,7 +137,7 @@ impl Segment {
             Some(a) => grid.octaves(self.samples.camera.arrivals[a as usize].position),
             None => 0.0,
         }));
-        context.counters.segments.store(self.segments() as u64, Relaxed);
+        context.counters.segments.fetch_max(self.segments() as u64, Relaxed);
 
         if let Some(choice) = self.techniques.bridges {
             if !self.sample_bridges(context, index, choice, cut) {
@@ -170,11 +171,6 @@ impl Segment {
                 reflected.solve_limited(sampled, weights, &first(), limit, cut)
             }
         };
-        if !context.keep_all && self.techniques.can_do_without_light_paths() {
-            // few light paths bring less, as balanced weights go; what all of them would bring counts
-            let share = if self.light_is_idle { f64::from(IDLE) } else { 1.0 };
-            self.light_is_idle = self.reflected.photon_share() / share < WORTHWHILE;
-        }
         costs.stage("propagation", self.reflected.bytes());
         context.counters.dropped.fetch_add(self.samples.camera.dropped, Relaxed);
         // figures that hardly change are taken ever more rarely
@@ -255,10 +251,21 @@ impl Segment {
         is_done
     }
 
-    /// Learns from this iteration where light paths should begin, by what they bring as a share of what is shown.
-    /// Returns the bytes that it took.
-    fn learn(&mut self, context: &Context, cut: &Cut) -> usize {
-        let Ok(shown) = context.film.read_pass(Pass::Combined, context.film.rect()) else { return 0 };
+    /// Whether light paths are left out where they do not pay.
+    fn is_thrifty(&self, context: &Context) -> bool {
+        !context.keep_all && self.techniques.can_do_without_light_paths()
+    }
+
+    /// Learns from this iteration where light paths should begin and how many of them pay, by what they bring as a
+    /// share of what is shown. Returns the bytes that it took, if there was something to learn.
+    fn learn(&mut self, context: &Context, index: u32, cut: &Cut) -> Option<usize> {
+        let paths = self.samples.light.starts.len();
+        let guides = self.techniques.emission_guiding && self.guiding.finish_iteration(paths);
+        let judges = self.is_thrifty(context) && Economy::looks(index);
+        if !guides && !judges {
+            return None;
+        }
+        let shown = context.film.read_pass(Pass::Combined, context.film.rect()).ok()?;
         let shown: Vec<f32> =
             shown.chunks_exact(4).map(|c| luminance(Vec3::new(c[0], c[1], c[2])).max(0.0)).collect();
         let mean = shown.iter().map(|&l| f64::from(l)).sum::<f64>() / shown.len() as f64;
@@ -269,9 +276,17 @@ impl Segment {
             Some(Start { arrival: p.arrival?, passages: p.passages, worth })
         });
         let starts: Vec<Start> = starts.collect();
-        let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
+        let world = context.world;
+        let sampled = self.samples.with(world, self.techniques.bridges.map(|_| &self.bridges));
         let (weights, reflected, max_depth) = (&self.weights, &self.reflected, context.max_depth);
-        self.guiding.learn(Outcome { sampled, weights, reflected, starts: &starts, max_depth }, cut)
+        let outcome = Outcome { sampled, weights, reflected, starts: &starts, max_depth };
+        if judges {
+            self.economy.judge(outcome, light_paths(self.techniques.light_paths, context) as u32, cut);
+            let left_out = &context.counters.left_out;
+            *left_out.lock().unwrap_or_else(PoisonError::into_inner) =
+                self.economy.left_out(world.has_hidden_light());
+        }
+        Some(if guides { self.guiding.learn(outcome, cut) } else { 0 })
     }
 
     /// Segments of this iteration.

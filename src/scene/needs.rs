@@ -27,6 +27,8 @@ pub struct Needs {
     pub light_shapes: bool,
     /// Lights infinitely far away.
     pub infinite_lights: bool,
+    /// Some surface may be a mirror or smooth glass.
+    pub mirrors: bool,
 }
 
 impl Needs {
@@ -40,6 +42,7 @@ impl Needs {
         emissive_surfaces: true,
         light_shapes: true,
         infinite_lights: true,
+        mirrors: true,
     };
 
     /// What the instances, lights and camera of a scene need.
@@ -82,6 +85,7 @@ impl Needs {
                 .lights
                 .iter()
                 .any(|l| matches!(l.kind, LightKind::Distant { .. } | LightKind::Dome { .. })),
+            mirrors: any_closure(&may_be_mirror),
         }
     }
 
@@ -96,6 +100,7 @@ impl Needs {
             (self.emissive_surfaces, "emission of surfaces: no used material emits"),
             (self.light_shapes, "intersection with light shapes: no light has one"),
             (self.infinite_lights, "environment: no light is infinitely far away"),
+            (self.mirrors, "specular chains: no used surface is a mirror or smooth glass"),
         ]
         .into_iter()
         .filter(|(needed, _)| !needed)
@@ -132,6 +137,23 @@ pub fn may_emit(closure: &Closure) -> bool {
     match closure {
         Closure::Emission { color, strength } => !color.is(0.0) && !strength.is(0.0),
         Closure::Principled(p) => !p.emission_color.is(0.0) && !p.emission_strength.is(0.0),
+        _ => false,
+    }
+}
+
+/// Whether a closure may have lobes that are Dirac deltas, straight passage apart.
+fn may_be_mirror(closure: &Closure) -> bool {
+    // alpha, its square, is well above where lobes become deltas
+    let is_rough = |roughness: &Value| matches!(roughness, Value::Constant(r) if r.min_element() >= 0.02);
+    match closure {
+        Closure::Glossy { roughness, .. } => !is_rough(roughness),
+        // of an index close to one, rough glass is smooth, too
+        Closure::Glass { .. } | Closure::Refraction { .. } => true,
+        Closure::Principled(p) => {
+            !p.transmission.is(0.0)
+                || !is_rough(&p.roughness)
+                || (!p.coat.is(0.0) && !is_rough(&p.coat_roughness))
+        }
         _ => false,
     }
 }
@@ -177,15 +199,38 @@ mod tests {
         assert!(
             !n.emissive_surfaces && !n.transparency && !n.light_shapes && !n.infinite_lights && !n.textures
         );
-        assert_eq!(n.left_out().len(), 8);
+        assert_eq!(n.left_out().len(), 9);
         // instances of none of it: still not needed
         b.add_instances(group(&[lamp]), &[]).unwrap();
         assert!(!super::Needs::of(&b.build().unwrap()).emissive_surfaces);
         b.add_instances(group(&[lamp]), &[at(1.0)]).unwrap();
         b.add_light("sky", r#"{"type":"dome","radiance":[1,1,1]}"#).unwrap();
         let n = super::Needs::of(&b.build().unwrap());
-        assert!(n.emissive_surfaces && n.transparency && n.infinite_lights);
+        assert!(n.emissive_surfaces && n.transparency && n.infinite_lights && !n.mirrors);
         assert!(super::Needs::ALL.left_out().is_empty());
+    }
+
+    #[test]
+    fn what_may_be_a_mirror_is_taken_for_one() {
+        let is_mirror = |surface: &str| super::may_be_mirror(&serde_json::from_str(surface).unwrap());
+        for surface in [
+            r#"{"type":"glossy","roughness":0}"#,
+            r#"{"type":"glossy","roughness":{"texture":0}}"#,
+            r#"{"type":"glass","roughness":0.5}"#,
+            r#"{"type":"principled","roughness":0.001}"#,
+            r#"{"type":"principled","transmission":0.1}"#,
+            r#"{"type":"principled","coat":0.2,"coat_roughness":0}"#,
+        ] {
+            assert!(is_mirror(surface), "{surface}");
+        }
+        for surface in [
+            r#"{"type":"glossy","roughness":0.1}"#,
+            r#"{"type":"principled","coat_roughness":0}"#,
+            r#"{"type":"transparent"}"#,
+            r#"{"type":"diffuse"}"#,
+        ] {
+            assert!(!is_mirror(surface), "{surface}");
+        }
     }
 
     #[test]

@@ -391,7 +391,11 @@ impl Session {
             height: self.film.height(),
             stop_reason: state.stop_reason,
             stages,
-            left_out: self.world.needs().left_out(),
+            left_out: [
+                self.world.needs().left_out(),
+                locked(&self.counters.left_out).iter().cloned().collect(),
+            ]
+            .concat(),
             warnings: self.warnings.clone(),
             curve: state.curve.clone(),
         }

@@ -167,6 +167,11 @@ impl World {
         &self.needs
     }
 
+    /// Whether there may be light that light paths alone find: of lights that no ray meets, by way of mirrors or glass.
+    pub fn has_hidden_light(&self) -> bool {
+        self.needs.mirrors && self.emitters.has_delta()
+    }
+
     /// What was repaired or left out, the scene's own warnings included.
     pub fn warnings(&self) -> &Warnings {
         &self.warnings

@@ -69,8 +69,14 @@ impl Cell<'_> {
     /// to the cluster. Photons are divided by the area, so it is the reciprocal that has to be right on average:
     /// independent points are tried until `wanted` of them lie on the cluster (inverse binomial sampling, Haldane
     /// 1945). Estimates of different `wanted` are independent. `hidden`: whether a point with its normal is out of
-    /// the representative's sight.
-    pub fn coverage(&self, world: &World, wanted: u32, hidden: &impl Fn(Vec3, Vec3) -> bool) -> f32 {
+    /// the representative's sight. Adds the points that were tried to `probes`.
+    pub fn coverage(
+        &self,
+        world: &World,
+        wanted: u32,
+        hidden: &impl Fn(Vec3, Vec3) -> bool,
+        probes: &mut u64,
+    ) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
         let n = self.representative.normal;
         let axis = n.abs().max_position();
@@ -115,6 +121,7 @@ impl Cell<'_> {
             });
             found += u32::from(is_there);
         }
+        *probes += u64::from(tries);
         // the cluster has arrivals, so it is somewhere between the points
         if found == 0 {
             return self.plane_cut(at).min(edge * edge / tries as f32);

@@ -79,6 +79,8 @@ pub struct Clusters {
     pub place: Vec<u32>,
     /// Cluster of every arrival.
     pub of: Vec<u32>,
+    /// Points at which it was looked for surfaces, to find areas.
+    pub probes: u64,
     keys: Vec<(u64, u32)>,
 }
 
@@ -160,12 +162,14 @@ impl Clusters {
     /// Finds the clusters' areas. Returns `false` if it was stopped.
     pub fn measure(&mut self, world: &World, grid: &Grid, all: Numbered, areas: Areas, cut: &Cut) -> bool {
         let order = &self.order;
-        self.clusters.par_iter_mut().with_min_len(GRAIN).for_each(|c| {
-            if !cut.is_raised() {
-                let members = &order[c.first as usize..][..(c.cameras + c.lights) as usize];
-                measure(world, grid, all, members, c, areas);
+        let of_one = |c: &mut Cluster| {
+            if cut.is_raised() {
+                return 0;
             }
-        });
+            let members = &order[c.first as usize..][..(c.cameras + c.lights) as usize];
+            measure(world, grid, all, members, c, areas)
+        };
+        self.probes = self.clusters.par_iter_mut().with_min_len(GRAIN).map(of_one).sum();
         !cut.is_raised()
     }
 
@@ -245,25 +249,28 @@ impl Layout {
     }
 }
 
-/// The areas of a cluster, each part of a voxel's having its share.
-fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut Cluster, areas: Areas) {
+/// The areas of a cluster, each part of a voxel's having its share. Returns how many points were looked at.
+fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut Cluster, areas: Areas) -> u64 {
     let representative = all.get(c.representative);
     let voxel = grid.voxel(representative.position);
     let parts = c.parts as f32;
     let (_, edge) = grid.place(&voxel);
     c.area = edge * edge / parts;
     if areas == Areas::None {
-        return;
+        return 0;
     }
     let cell = Cell { grid, voxel, representative, parted: c.parted };
     let hub = Hub::new(grid, representative);
     let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)));
-    let estimate = |points: u32| {
-        exact.unwrap_or_else(|| cell.coverage(world, points, &|p, n| hub.is_hidden(world, p, n))) / parts
+    let mut probes = 0;
+    let mut estimate = |points: u32| {
+        let is_hidden = |p, n| hub.is_hidden(world, p, n);
+        exact.unwrap_or_else(|| cell.coverage(world, points, &is_hidden, &mut probes)) / parts
     };
     let is_true = areas == Areas::True;
     c.area = estimate(if is_true { MOST_POINTS } else { FEW_POINTS });
     if is_true || (c.cameras > 0 && c.lights > 0) {
         c.inverse_area = 1.0 / estimate(MANY_POINTS);
     }
+    probes
 }

@@ -3,6 +3,7 @@
 use super::Cut;
 use super::bridge::Bridges;
 use super::cluster::Cluster;
+use super::store::EmissionHit;
 use super::weigh::{Sampled, Weights};
 use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
@@ -71,20 +72,35 @@ pub(super) fn has_end(s: Sampled, i: usize) -> bool {
     s.camera.outgoing[i].forward > 0.0
 }
 
-/// Emitted light that the segment which leaves arrival `i` met, weighed: `E / D_E`. `most`: passages through
-/// Dirac lobes up to which light counts.
-pub(super) fn emitted(s: Sampled, w: &Weights, i: usize, most: Option<u32>) -> Vec3 {
+/// Lights that the segment which leaves arrival `i` met, each with one over the density of all techniques, `1 / D_E`.
+fn met<'a>(s: Sampled<'a>, w: &Weights, i: usize) -> impl Iterator<Item = (&'a EmissionHit, f32)> {
     let hits = &s.camera.hits;
     let here = s.cluster_of(i);
     let camera = w.densities[s.clusters.place[i] as usize].camera / here.area;
     let first = hits.partition_point(|h| (h.arrival as usize) < i);
-    let own = hits[first..].iter().take_while(|h| h.arrival as usize == i);
-    own.filter(|h| most.is_none_or(|m| h.passages <= m))
-        .map(|h| {
-            let next_event = h.next_event_pdf * here.cameras as f32 / here.area;
-            h.light * reciprocal(h.forward * camera + next_event + h.light_density)
-        })
-        .sum()
+    let own = hits[first..].iter().take_while(move |h| h.arrival as usize == i);
+    own.map(move |h| {
+        let next_event = h.next_event_pdf * here.cameras as f32 / here.area;
+        (h, reciprocal(h.forward * camera + next_event + h.light_density))
+    })
+}
+
+/// Emitted light that the segment which leaves arrival `i` met, weighed: `E / D_E`. `most`: passages through
+/// Dirac lobes up to which light counts.
+pub(super) fn emitted(s: Sampled, w: &Weights, i: usize, most: Option<u32>) -> Vec3 {
+    let counted = met(s, w, i).filter(|(h, _)| most.is_none_or(|m| h.passages <= m));
+    counted.map(|(h, reciprocal)| h.light * reciprocal).sum()
+}
+
+/// Share of light paths in the density of the light that was met, in the mean.
+pub(super) fn emitted_share(s: Sampled, w: &Weights, i: usize) -> f32 {
+    let (mut all, mut by_light) = (0.0, 0.0);
+    for (h, reciprocal) in met(s, w, i) {
+        let light = h.light.element_sum() * reciprocal;
+        all += light;
+        by_light += light * h.light_density * reciprocal;
+    }
+    if all > 0.0 { by_light / all } else { 0.0 }
 }
 
 /// The constants of all camera segments.

@@ -5,6 +5,7 @@
 //! judged by its brightness. The densities of later iterations rest on what earlier ones found, and of every iteration
 //! on nothing of its own: that biases nothing.
 
+use super::cluster::Cluster;
 use super::exchange::{GRAIN, has_end, per_diffuse_cluster};
 use super::photons::photon_values;
 use super::propagate::Reflected;
@@ -87,7 +88,7 @@ impl Guiding {
 /// What every light path of the store brought.
 fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
     let Outcome { sampled: s, weights: w, .. } = o;
-    let arrivals = worth_of_arrivals(o);
+    let arrivals = worth_of_arrivals(o, |_| 1.0);
     let shared = per_diffuse_cluster(s, cut, |c| {
         let reflecting = s.cameras(c).map(|i| (arrivals[i] * s.camera.arrivals[i].reflectance).as_dvec3());
         reflecting.sum::<DVec3>().as_vec3()
@@ -117,8 +118,9 @@ fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
     ranges.into_par_iter().with_min_len(GRAIN).map(of_path).collect()
 }
 
-/// What one unit of basic radiance that each camera arrival reflects of its photons adds to the picture.
-fn worth_of_arrivals(o: Outcome) -> Vec<Vec3> {
+/// What one unit of light that each camera arrival reflects of its photons adds to the picture. `spread`: a factor for
+/// every bounce, by the cluster that is left.
+pub(super) fn worth_of_arrivals(o: Outcome, spread: impl Fn(&Cluster) -> f32 + Sync) -> Vec<Vec3> {
     let Outcome { sampled: s, weights: w, starts, .. } = o;
     let constants = &o.reflected.segments;
     let n = s.camera.arrivals.len();
@@ -136,7 +138,7 @@ fn worth_of_arrivals(o: Outcome) -> Vec<Vec3> {
                 if !has_end(s, i) {
                     break;
                 }
-                along *= constants[i].along_path(s, w, i) * constants[i].carry;
+                along *= constants[i].along_path(s, w, i) * constants[i].carry * spread(s.cluster_of(i));
                 bounces = bounces.saturating_add(1 + s.camera.outgoing[i].passages);
             }
         }

@@ -7,6 +7,7 @@ pub mod bridge;
 pub mod camera;
 pub mod cluster;
 pub mod depth;
+pub mod economy;
 mod exchange;
 pub mod grid;
 pub mod guiding;

@@ -24,8 +24,8 @@ pub struct FromPhotons {
     pub brought: Vec3,
 }
 
-/// Flux over area of a photon, times its weight beside the other techniques.
-pub(super) fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
+/// Weight of a photon beside the other techniques: the share of light paths in the density of all.
+pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
     let i = s.camera.arrivals.len() + j;
     let c = s.cluster_of(i);
     let photon = &s.light.photons[j];
@@ -49,8 +49,13 @@ pub(super) fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
         }
     };
     // with no photon to compare with, the camera has it all; with no camera path either, this one has
-    let weight = if own + others > 0.0 { own / (own + others) } else { 1.0 };
-    photon.flux * (weight * c.inverse_area)
+    if own + others > 0.0 { own / (own + others) } else { 1.0 }
+}
+
+/// Flux over area of a photon, times its weight.
+pub(super) fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
+    let c = s.cluster_of(s.camera.arrivals.len() + j);
+    s.light.photons[j].flux * (photon_weight(s, w, j) * c.inverse_area)
 }
 
 /// What every photon brings to its cluster; nothing where no camera path arrives.

@@ -50,8 +50,7 @@ impl Reflected {
             }
             let brought = per_index(s, |i| {
                 let segment = &self.segments[i];
-                let end = has_end(s, i).then(|| (self.carried[i + 1], self.photons[i + 1].brought));
-                segment.value(segment.emitted, end)
+                segment.value(segment.emitted, has_end(s, i).then(|| self.end_of(i)))
             });
             self.carried = gather(s, w, &brought, cut);
             let now = total(&|i| self.carried[i]);
@@ -77,14 +76,10 @@ impl Reflected {
         towards_camera(s, i, self.carried[i], self.photons[i])
     }
 
-    /// Share of photons in the light that arrivals reflect: the mean over all of them.
-    pub fn photon_share(&self) -> f64 {
-        let share = |(photons, carried): (&FromPhotons, &Vec3)| {
-            let (p, c) = (luminance(photons.reflected), luminance(*carried));
-            // false for NaN
-            if p > 0.0 { f64::from(p / (p + c)) } else { 0.0 }
-        };
-        self.photons.iter().zip(&self.carried).map(share).sum::<f64>() / self.photons.len().max(1) as f64
+    /// What is reflected at the end of the segment that leaves arrival `i`, which has one: carried light, and what
+    /// photons bring, see [`Segment::value`].
+    pub(super) fn end_of(&self, i: usize) -> (Vec3, Vec3) {
+        (self.carried[i + 1], self.photons[i + 1].brought)
     }
 
     /// Memory, bytes.

@@ -226,11 +226,17 @@ impl Weights {
     }
 }
 
-/// Basic radiance times the weight of a next-event segment over its own density, `E / D_E`, for a cluster of
-/// `n` arrivals that each sampled one. `p_cam`: density of the camera's segments along it.
-fn next_event_value(n: &NextEvent, p_cam: f32, c: &Cluster) -> Vec3 {
+/// Density of all techniques along a next-event segment of a cluster whose arrivals sampled one each. `p_cam`: density of the
+/// camera's segments along it.
+pub(super) fn next_event_density(n: &NextEvent, p_cam: f32, c: &Cluster) -> f32 {
     let met = if n.is_delta { 0.0 } else { p_cam };
-    let density = (met + n.next_event_pdf * c.cameras as f32) / c.area + n.light_density;
+    (met + n.next_event_pdf * c.cameras as f32) / c.area + n.light_density
+}
+
+/// Basic radiance times the weight of a next-event segment over its own density, `E / D_E`, see
+/// [`next_event_density`].
+fn next_event_value(n: &NextEvent, p_cam: f32, c: &Cluster) -> Vec3 {
+    let density = next_event_density(n, p_cam, c);
     if density > 0.0 { n.light / density } else { Vec3::ZERO }
 }
 

@@ -148,6 +148,15 @@ impl Emitter {
         }
     }
 
+    /// Whether no ray can meet it by chance.
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Self::Point(_) => true,
+            Self::Distant(l) => l.is_delta(),
+            _ => false,
+        }
+    }
+
     /// Whether a ray's place and its direction are drawn at all.
     pub fn draws(&self) -> [bool; 2] {
         match self {

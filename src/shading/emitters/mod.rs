@@ -124,6 +124,11 @@ impl Emitters {
         matches!(self.get(id), Kind::Light(Emitter::Distant(_) | Emitter::Dome(_)))
     }
 
+    /// Whether some emitter is met by no ray.
+    pub fn has_delta(&self) -> bool {
+        self.lights.iter().any(Emitter::is_delta)
+    }
+
     /// Power of all emitters, W; that of domes and distant lights is what enters the scene's sphere.
     pub fn total_power(&self) -> Vec3 {
         self.total_power

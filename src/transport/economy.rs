@@ -1,0 +1,369 @@
+//! How many light paths pay: as many as make error times cost least (efficiency-aware multiple importance sampling,
+//! Grittmann et al. 2022, for segments).
+//!
+//! A contribution `C = g / D` was weighed by the density `D` of all techniques, of which light paths have the share
+//! `p`. With `r` times the light paths it would have been `C' = C / (1 - p + p r)`. So the contributions of one
+//! iteration tell the second moment for every `r`, also of light that fewer light paths would have missed: what light
+//! paths find best speaks for itself through them. What it is worth is judged by the brightness of its pixel, at deeper
+//! arrivals along their own camera path. Looking is done by iterations that have all their light paths, and decides for
+//! later ones: that biases nothing.
+
+use super::Cut;
+use super::cluster::Cluster;
+use super::exchange::{GRAIN, Segment, emitted_share, has_end};
+use super::guiding::{Outcome, worth_of_arrivals};
+use super::photons::photon_weight;
+use super::weigh::{Sampled, Weights, next_event_density};
+use crate::shading::SurfaceClass;
+use crate::shading::bsdf::Bsdf;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Numbers of light paths that are compared, as shares of all.
+const SHARES: [f32; 4] = [0.0, 1.0 / 16.0, 0.25, 1.0];
+/// Cost of a point at which an area is probed, in arrivals.
+const PROBE: f64 = 0.25;
+/// Growth of their number with that of light paths: fewer photons are in nearly as many clusters.
+const PROBE_GROWTH: f64 = 0.2;
+/// Factor on the variance that fewer light paths add: what deeper arrivals lose is told so much too low (measured,
+/// `benches/NOTES.md`).
+const UNTOLD: f64 = 3.0;
+/// Gain that is worth the risk of leaving light paths out: what they have not found so far is not known.
+const WORTHWHILE: f64 = 1.1;
+/// So many light paths at least, if any: those of a cluster would else be parts of one path, and what is estimated by
+/// one of them would depend on the density of the others (1 % dark with four).
+const FEWEST: f32 = 64.0;
+/// Clusters that are looked at, about.
+const MOST: usize = 1 << 14;
+
+/// A figure for every share of the light paths.
+type PerShare = [f64; SHARES.len()];
+
+/// What has been found out about the worth of light paths.
+#[derive(Debug)]
+pub struct Economy {
+    /// For every share, the sum of what pixels are off, as far as it has been looked at.
+    errors: PerShare,
+    /// Share of the light paths that pays.
+    share: f32,
+}
+
+impl Default for Economy {
+    fn default() -> Self {
+        Self { errors: [0.0; SHARES.len()], share: 1.0 }
+    }
+}
+
+/// What some technique may bring to a cluster.
+#[derive(Clone, Copy, Debug, Default)]
+struct Item {
+    /// Per value of a lobe: basic radiance, weighed, over area.
+    light: Vec3,
+    /// Share of light paths in the density of all techniques.
+    share: f32,
+}
+
+/// What a camera arrival adds to its cluster.
+#[derive(Clone, Copy, Debug, Default)]
+struct Draws {
+    next_event: Item,
+    emitted: Item,
+    carried: Item,
+}
+
+impl Economy {
+    /// Whether iteration `index` samples all light paths, to look what they bring.
+    pub fn looks(index: u32) -> bool {
+        (index + 1).is_power_of_two() && (index + 1).trailing_zeros().is_multiple_of(2)
+    }
+
+    /// How many of `all` light paths iteration `index` should sample. `some`: whether some must be, since there may be
+    /// light that camera paths cannot find.
+    pub fn light_paths(&self, all: f32, index: u32, some: bool) -> f32 {
+        match Self::looks(index) {
+            true => all,
+            false => match self.usual(some) {
+                0.0 => 0.0,
+                share => (share * all).ceil().max(FEWEST).min(all),
+            },
+        }
+    }
+
+    /// Share of the light paths in an iteration that does not look.
+    fn usual(&self, some: bool) -> f32 {
+        if some { self.share.max(SHARES[1]) } else { self.share }
+    }
+
+    /// What is left out, for the log and the statistics.
+    pub fn left_out(&self, some: bool) -> Option<String> {
+        let share = self.usual(some);
+        let percent = 100.0 * (1.0 - share);
+        let why = "they cost more than they bring here";
+        (share < 1.0).then(|| format!("light paths, {percent:.0} % of them in most iterations: {why}"))
+    }
+
+    /// Judges by an iteration that sampled all light paths, which were so many.
+    pub fn judge(&mut self, o: Outcome, light_paths: u32, cut: &Cut) {
+        let found = errors(o, cut);
+        if cut.is_raised() || found.iter().any(|v| v.is_nan()) {
+            return;
+        }
+        // with a smaller kernel fewer clusters have something to say: none of it is forgotten
+        self.errors.iter_mut().zip(found).for_each(|(sum, v)| *sum += v);
+        let Outcome { sampled: s, starts, .. } = o;
+        let camera = (s.camera.arrivals.len() + starts.len()) as f64;
+        let light = s.light.arrivals.len() as f64 + f64::from(light_paths);
+        let probes = PROBE * s.clusters.probes as f64;
+        let cost = |r: f64| camera + r * light + r.powf(PROBE_GROWTH) * probes;
+        let all = SHARES.len() - 1;
+        let told = |k: usize| self.errors[k] * self.errors[k];
+        let variance = |k: usize| {
+            let added = told(k) - told(all);
+            told(all) + if added > 0.0 { UNTOLD * added } else { added }
+        };
+        let product = |k: usize| variance(k) * cost(f64::from(SHARES[k]));
+        let best = (0..all).min_by(|&a, &b| product(a).total_cmp(&product(b))).unwrap_or(all);
+        self.share = if WORTHWHILE * product(best) < product(all) { SHARES[best] } else { 1.0 };
+    }
+}
+
+/// Standard deviations, summed over some of the clusters: of variances a few bright specks would have most. What a
+/// deeper arrival gathers is shared by those of the cluster that it is seen from, so each of them has a part of its
+/// error.
+fn errors(o: Outcome, cut: &Cut) -> PerShare {
+    let worth = worth_of_arrivals(o, |c| 1.0 / (c.cameras as f32).sqrt());
+    let clusters = &o.sampled.clusters.clusters;
+    let stride = clusters.len().div_ceil(MOST);
+    let of_some = |(chunk, clusters): (usize, &[Cluster])| {
+        let mut sum = [0.0; SHARES.len()];
+        for k in (chunk * GRAIN..chunk * GRAIN + clusters.len()).step_by(stride) {
+            if !cut.is_raised() {
+                let found = of_cluster(o, k, &worth);
+                sum.iter_mut().zip(found).for_each(|(sum, v)| *sum += v.sqrt());
+            }
+        }
+        sum
+    };
+    let parts: Vec<PerShare> = clusters.par_chunks(GRAIN).enumerate().map(of_some).collect();
+    // in order: the same sum on any number of threads
+    parts.iter().fold([0.0; SHARES.len()], |sum, part| std::array::from_fn(|k| sum[k] + part[k]))
+}
+
+/// The variances of cluster number `k`. A single camera arrival does not tell how much it would vary.
+fn of_cluster(o: Outcome, k: usize, worth: &[Vec3]) -> PerShare {
+    let s = o.sampled;
+    let c = &s.clusters.clusters[k];
+    let mut sum = [0.0; SHARES.len()];
+    if c.cameras < 2 || s.cameras(c).all(|i| worth[i] == Vec3::ZERO) {
+        return sum;
+    }
+    let draws: Vec<Draws> = s.cameras(c).map(|i| draws(o, i)).collect();
+    let photons: Vec<Item> = s
+        .lights(c)
+        .map(|j| {
+            let photon = &s.light.photons[j];
+            let counts = o.max_depth.is_none_or(|most| photon.bounces < most);
+            let share = photon_weight(s, o.weights, j);
+            let flux = if counts { photon.flux } else { Vec3::ZERO };
+            Item { light: flux * (share * c.inverse_area), share }
+        })
+        .collect();
+    // by column: the lobe's values of the next-event segment and of the one that leaves, and of the photon's
+    let mut add = |scale: f64, row: &dyn Fn(usize) -> [Vec3; 2], photon: &dyn Fn(usize) -> Vec3| {
+        let camera = draws.iter().enumerate().map(|(column, d)| {
+            let [next_event, leaving] = row(column);
+            [value(&d.next_event, next_event), value(&d.emitted, leaving), value(&d.carried, leaving)]
+        });
+        let light = photons.iter().enumerate().map(|(column, p)| value(p, photon(column)));
+        let found = of_row(camera, light);
+        sum.iter_mut().zip(found).for_each(|(sum, v)| *sum += scale * v);
+    };
+    match c.class {
+        SurfaceClass::Diffuse => {
+            // all arrivals reflect alike: one row, and how much its square counts
+            let reflected = |i: usize| f64::from((worth[i] * s.camera.arrivals[i].reflectance).element_sum());
+            let scale: f64 = s.cameras(c).map(|i| reflected(i).powi(2)).sum();
+            let grey = Vec3::splat(1.0 / 3.0);
+            let (camera, light): (Vec<usize>, Vec<usize>) = (s.cameras(c).collect(), s.lights(c).collect());
+            let row = |column: usize| {
+                let i = camera[column];
+                [grey * s.camera.next_events[i].pdf, grey * s.camera.outgoing[i].pdf]
+            };
+            add(scale, &row, &|column| grey * s.light.arrivals[light[column]].back_pdf);
+        }
+        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+            let camera: Vec<usize> = s.cameras(c).collect();
+            for (r, &i) in camera.iter().enumerate().filter(|&(_, &i)| worth[i] != Vec3::ZERO) {
+                let a = &s.camera.arrivals[i];
+                let bsdf: Bsdf = a.bsdf(s.world);
+                let f = o.weights.row(k, r);
+                let row = |column: usize| {
+                    let next_event = &s.camera.next_events[camera[column]];
+                    let lit = match next_event.next_event_pdf > 0.0 {
+                        true => bsdf.eval(a.wo, next_event.direction),
+                        false => Vec3::ZERO,
+                    };
+                    [worth[i] * lit, worth[i] * f[column]]
+                };
+                add(1.0, &row, &|column| worth[i] * f[camera.len() + column]);
+            }
+        }
+    }
+    sum
+}
+
+/// What an item comes to by a lobe's value, and its share of light paths.
+fn value(item: &Item, lobe: Vec3) -> (f64, f64) {
+    (f64::from(item.light.dot(lobe)), f64::from(item.share.clamp(0.0, 1.0)))
+}
+
+/// What camera arrival `i` adds to its cluster, per value of a lobe.
+fn draws(o: Outcome, i: usize) -> Draws {
+    let (s, w): (Sampled, &Weights) = (o.sampled, o.weights);
+    let c = s.cluster_of(i);
+    let next_event = &s.camera.next_events[i];
+    let segment: &Segment = &o.reflected.segments[i];
+    let mut draws = Draws::default();
+    if next_event.next_event_pdf > 0.0 {
+        // the densities of the cluster's lobes along it are those of its own, as far as they are alike
+        let p_cam = c.cameras as f32 * s.camera.arrivals[i].survival * next_event.pdf;
+        let density = next_event_density(next_event, p_cam, c);
+        let light = next_event.light / (density * c.area);
+        draws.next_event = Item { light, share: next_event.light_density / density };
+    }
+    if !s.camera.arrivals[i].goes_on {
+        return draws;
+    }
+    draws.emitted = Item { light: segment.emitted / c.area, share: emitted_share(s, w, i) };
+    if has_end(s, i) {
+        let p_light = w.densities[s.clusters.place[i + 1] as usize].light.max(0.0);
+        let light = segment.value(Vec3::ZERO, Some(o.reflected.end_of(i))) / c.area;
+        let by_light = segment.light * p_light;
+        let density = segment.density(p_light, 0.0);
+        let share = if density > 0.0 { by_light / density } else { 0.0 };
+        draws.carried = Item { light, share };
+    }
+    draws
+}
+
+/// The variance of what one arrival gathers. `camera`: what every camera arrival of the cluster brings, `photons`: what
+/// photons do, as values and shares of light paths.
+///
+/// Light that light paths have less than half of is found well by the camera's: there the deviations of its
+/// arrivals from their mean are its variance. Of other light they may not have found any, and all contributions tell
+/// its second moment.
+fn of_row(
+    camera: impl ExactSizeIterator<Item = [(f64, f64); 3]>,
+    photons: impl Iterator<Item = (f64, f64)>,
+) -> PerShare {
+    let n = camera.len() as f64;
+    let (mut sums, mut squares, mut found) = ([0.0; SHARES.len()], [0.0; SHARES.len()], [0.0; SHARES.len()]);
+    // (light of the camera's techniques, light of photons), of light with the share `p` of light paths
+    let moments = |p: f64, r: f64| {
+        let density = 1.0 - p + p * r;
+        let square = density * density;
+        // what only light paths find is never found without them
+        if density > 0.0 { ((1.0 - p) / square, p * r / square) } else { (f64::INFINITY, 0.0) }
+    };
+    for items in camera {
+        for (k, r) in SHARES.iter().map(|&r| f64::from(r)).enumerate() {
+            let mut well = 0.0;
+            for &(c, p) in &items {
+                if p < 0.5 {
+                    well += c / (1.0 - p + p * r);
+                    found[k] += c * c * moments(p, r).1;
+                } else if c != 0.0 {
+                    let (by_camera, by_photons) = moments(p, r);
+                    found[k] += c * c * (by_camera + by_photons);
+                }
+            }
+            sums[k] += well;
+            squares[k] += well * well;
+        }
+    }
+    for (c, p) in photons.filter(|&(c, _)| c != 0.0) {
+        for (k, r) in SHARES.iter().map(|&r| f64::from(r)).enumerate() {
+            let (by_camera, by_photons) = moments(p, r);
+            found[k] += c * c * if p < 0.5 { by_photons } else { by_camera + by_photons };
+        }
+    }
+    std::array::from_fn(|k| found[k] + (squares[k] - sums[k] * sums[k] / n).max(0.0) * n / (n - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sampler::hash_unit;
+
+    /// Camera draws, and light draws of a share of their full number, of an integral over [0,1].
+    struct Drawn {
+        camera: Vec<[(f64, f64); 3]>,
+        photons: Vec<(f64, f64)>,
+    }
+
+    impl Drawn {
+        fn sum(&self) -> f64 {
+            self.camera.iter().flatten().chain(&self.photons).map(|&(c, _)| c).sum()
+        }
+    }
+
+    /// Camera draws are uniform; light draws fall into the last tenth, where the integrand is large.
+    fn draw(share: f64, seed: u32) -> Drawn {
+        const CAMERA: u32 = 12;
+        const LIGHT: u32 = 40;
+        let g = |x: f64| if x > 0.9 { 6.0 * (1.0 + x) } else { 0.2 * x };
+        let by_light = |x: f64| if x > 0.9 { share * f64::from(LIGHT) * 10.0 } else { 0.0 };
+        let item = |x: f64| {
+            let density = f64::from(CAMERA) + by_light(x);
+            (g(x) / density, by_light(x) / density)
+        };
+        let unit = |k: u32| f64::from(hash_unit(seed, k));
+        let camera = (0..CAMERA).map(|k| [item(unit(k)), (0.0, 0.0), (0.0, 0.0)]).collect();
+        // so many on average, independent of each other
+        let tries = LIGHT * 16;
+        let falls = (0..tries).filter(|k| unit(1000 + 2 * k) < share / 16.0);
+        let photons = falls.map(|k| item(0.9 + 0.1 * unit(1001 + 2 * k))).collect();
+        Drawn { camera, photons }
+    }
+
+    #[test]
+    fn what_fewer_light_paths_would_bring_is_told_by_all_of_them() {
+        let runs = 20_000;
+        let mut told = [0.0; SHARES.len()];
+        for seed in 0..runs {
+            let d = draw(1.0, seed);
+            let found = of_row(d.camera.into_iter(), d.photons.into_iter());
+            told.iter_mut().zip(found).for_each(|(sum, v)| *sum += v / f64::from(runs));
+        }
+        for (k, share) in SHARES.into_iter().enumerate() {
+            let sums: Vec<f64> = (0..runs).map(|seed| draw(f64::from(share), runs + seed).sum()).collect();
+            let mean = sums.iter().sum::<f64>() / f64::from(runs);
+            let variance = sums.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / f64::from(runs - 1);
+            println!("share {share}: told {:.5}, found {variance:.5}, mean {mean:.4}", told[k]);
+            // draws of the camera are so many, not so many on average, which makes them a little better
+            assert!((0.95..1.2).contains(&(told[k] / variance)), "{share}: {} {variance}", told[k]);
+        }
+    }
+
+    #[test]
+    fn what_only_light_paths_find_keeps_them() {
+        let camera = || [[(1.0, 0.0), (0.0, 0.0), (0.0, 0.0)]; 4].into_iter();
+        let found = of_row(camera(), [(1e-3, 1.0)].into_iter());
+        assert!(found[0].is_infinite() && found[1..].iter().all(|v| v.is_finite()), "{found:?}");
+        // and where none of it was found, the rest decides alone
+        assert_eq!(of_row(camera(), [(0.0, 1.0)].into_iter()), [0.0; SHARES.len()]);
+    }
+
+    #[test]
+    fn all_are_sampled_at_first_and_now_and_then() {
+        let none = Economy { share: 0.0, ..Economy::default() };
+        for k in 0..17 {
+            let all = if [0, 3, 15].contains(&k) { 5000.0 } else { 0.0 };
+            assert_eq!(none.light_paths(5000.0, k, false), all, "{k}");
+        }
+        assert_eq!(none.light_paths(5000.0, 1, true), 313.0);
+        assert_eq!(none.light_paths(500.0, 1, true), FEWEST);
+        assert_eq!(none.light_paths(5.0, 1, true), 5.0);
+        assert_eq!(Economy::default().light_paths(5.0, 1, false), 5.0);
+    }
+}
