@@ -264,3 +264,22 @@ fn bad_requests_are_refused() {
         Err(FilmError::BufferLength { needed: 240, given: 239 })
     ));
 }
+
+#[test]
+fn bands_are_whole_tiles_and_cover_the_film_once() {
+    for (width, height, most, count) in
+        [(64, 64, 1 << 20, 1), (64, 64, 0, 2), (100, 1080, 100 * 300, 4), (7, 33, 7 * 32, 2), (5, 1, 1, 1)]
+    {
+        let film = Film::new(width, height, all_passes()).unwrap();
+        let bands = film.bands(most);
+        assert_eq!(bands.len(), count, "{width} x {height}, {most}");
+        for band in &bands {
+            assert!((band.y % 32, band.x, band.width) == (0, 0, width) && band.height > 0);
+            film.add_to_band(*band, |x, y| {
+                assert!(band.intersection(&Rect::new(x, y, 1, 1)).is_some());
+                grey(1.0)
+            });
+        }
+        assert_eq!(film.total_samples(), u64::from(width) * u64::from(height));
+    }
+}

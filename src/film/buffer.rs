@@ -104,7 +104,24 @@ impl Film {
     /// Adds one sample to every pixel, in parallel: for integrators that make whole pictures.
     /// `sample(x, y)` is asked for film pixels.
     pub fn add_iteration(&self, sample: impl Fn(u32, u32) -> Sample + Sync) {
-        self.par_tiles().for_each(|shared| {
+        self.add_to_band(self.rect(), sample);
+    }
+
+    /// The film from top to bottom, in bands of whole tiles with at most about so many pixels.
+    pub fn bands(&self, most_pixels: u64) -> Vec<Rect> {
+        let down = self.height.div_ceil(TILE_SIZE);
+        let row_of_tiles = u64::from(TILE_SIZE) * u64::from(self.width);
+        let most = (most_pixels / row_of_tiles).clamp(1, u64::from(down)) as u32;
+        // all alike
+        let rows = down.div_ceil(down.div_ceil(most)) * TILE_SIZE;
+        let band = |y: u32| Rect::new(0, y, self.width, rows.min(self.height - y));
+        (0..self.height).step_by(rows as usize).map(band).collect()
+    }
+
+    /// Adds one sample to every pixel of a band of [`Film::bands`], as [`Film::add_iteration`] does.
+    pub fn add_to_band(&self, band: Rect, sample: impl Fn(u32, u32) -> Sample + Sync) {
+        let rows = band.y..band.y + band.height;
+        self.par_tiles().filter(|shared| rows.contains(&shared.rect().y)).for_each(|shared| {
             let mut tile = shared.lock();
             for (x, y) in shared.rect().pixels() {
                 tile.add(x, y, &sample(x, y));

@@ -50,7 +50,7 @@ pub struct Counters {
     pub left_out: Mutex<Option<String>>,
     /// Contributions of segments that were not finite and were dropped.
     pub dropped: AtomicU64,
-    /// The graph of the segment method, from the last iteration in which it was looked at.
+    /// The graph of the segment method, from the last iteration in which it was looked at (its last band).
     pub graph: Mutex<Option<Report>>,
     /// Seconds spent in each stage, and the bytes that it holds.
     pub stages: Mutex<BTreeMap<&'static str, (f64, u64)>>,
@@ -174,7 +174,7 @@ pub trait Integrator: Send {
     /// stop sign is raised. `index` counts the calls, for the random numbers.
     fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd;
 
-    /// Whether an iteration that is cut short leaves nothing in the film.
+    /// Whether an iteration that is cut short leaves nothing in the film, or but a few bands of it.
     fn is_all_or_nothing(&self) -> bool;
 }
 

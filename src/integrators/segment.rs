@@ -1,7 +1,7 @@
 //! Segment-based light transport: the whole method, iteration by iteration.
 
 use super::{Context, Integrator, IterationEnd, StageCosts};
-use crate::film::{Pass, Sample, SplatBuffer};
+use crate::film::{Pass, Rect, Sample, SplatBuffer};
 use crate::math::sampler::hash;
 use crate::math::{LUMINANCE, Sampler, luminance};
 use crate::shading::World;
@@ -22,6 +22,10 @@ use std::sync::atomic::Ordering::Relaxed;
 
 /// Of the picture's mean brightness, what is added to that of a pixel where shares of it are judged.
 const DARK: f32 = 0.1;
+/// What the segments of a camera path take until they are in the film, about, bytes.
+const BYTES_PER_PIXEL: u64 = 2048;
+/// Most light paths for each pixel of a band, so that theirs stay within bounds, too.
+const LIGHT_PATHS_PER_PIXEL: u64 = 4;
 /// Keeps the random numbers of light paths apart from those of pixels.
 const LIGHT_STREAM: u32 = 0x11e4_7000;
 /// Keeps those of the grids apart from both.
@@ -54,9 +58,9 @@ pub struct Segment {
     weights: Weights,
     reflected: Reflected,
     guiding: Guiding,
-    /// What every pixel sees, row by row.
+    /// What every pixel of the band sees, row by row.
     primaries: Vec<Primary>,
-    /// For every pixel, the size of the voxel in which it is filtered, octaves over the kernel's.
+    /// For every pixel of the band, the size of the voxel in which it is filtered, octaves over the kernel's.
     octaves: Vec<f32>,
     /// First arrival of every camera path that has one.
     starts: Vec<u32>,
@@ -71,27 +75,13 @@ impl Segment {
     }
 }
 
-/// Light paths of an iteration, of which there are so many for each camera path.
-fn light_paths(per_camera_path: f32, context: &Context) -> f32 {
-    (per_camera_path * context.crop.area() as f32).ceil()
-}
-
 impl Integrator for Segment {
     fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd {
         let stopped = || context.stop.is_raised();
         let cut = Cut(&stopped);
         let mut costs = StageCosts::new(context.counters);
-        match self.transport(context, index, &cut, &mut costs) {
-            false => IterationEnd::CutShort,
-            true => {
-                self.gather(context);
-                costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-                if let Some(bytes) = self.learn(context, index, &cut) {
-                    costs.stage("learning", bytes);
-                }
-                IterationEnd::Complete
-            }
-        }
+        let is_complete = self.all_bands(context, index, &cut, &mut costs);
+        if is_complete { IterationEnd::Complete } else { IterationEnd::CutShort }
     }
 
     fn is_all_or_nothing(&self) -> bool {
@@ -99,19 +89,94 @@ impl Integrator for Segment {
     }
 }
 
+/// What is found out about an iteration while its bands are made.
+struct Lessons {
+    /// Whether light paths learn from it where to begin.
+    guides: bool,
+    /// Whether it tells how many of them pay.
+    judges: bool,
+    /// Its light paths, and the bands that share them.
+    light_paths: f32,
+    bands: usize,
+}
+
 impl Segment {
-    /// All stages up to the film. Returns `false` if it was stopped.
-    fn transport(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
-        let Context { world, sensor, .. } = *context;
-        let all = light_paths(self.techniques.light_paths, context);
+    /// An iteration: light paths, and band by band the camera paths that they are joined to. Returns `false` if it was
+    /// stopped.
+    fn all_bands(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
+        let bands = self.bands(context);
+        let all = self.most_light_paths(context);
         let light_paths = match self.is_thrifty(context) {
-            true => self.economy.light_paths(all, index, world.has_hidden_light()),
+            true => self.economy.light_paths(all, index, context.world.has_hidden_light()),
             false => all,
         };
-        if !self.sample_camera(context, index, light_paths, cut) {
+        if !self.sample_light(context, index, light_paths as u32, cut) {
             return false;
         }
-        if !self.sample_light(context, index, light_paths as u32, cut) {
+        costs.stage("sampling", self.samples.light.bytes());
+        let lessons = Lessons {
+            guides: self.techniques.emission_guiding
+                && self.guiding.begin_iteration(self.samples.light.starts.len()),
+            judges: self.is_thrifty(context) && Economy::looks(index),
+            light_paths,
+            bands: bands.len(),
+        };
+        for band in bands {
+            let corner = (context.crop.x + band.x, context.crop.y + band.y);
+            let crop = Rect::new(corner.0, corner.1, band.width, band.height);
+            let of_band = Context { crop, ..*context };
+            if !self.transport(&of_band, index, light_paths, cut, costs) {
+                return false;
+            }
+            self.gather(&of_band, band);
+            costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
+            if lessons.guides || lessons.judges {
+                let bytes = self.learn(&of_band, band, &lessons, cut);
+                costs.stage("learning", bytes);
+            }
+        }
+        if lessons.guides {
+            self.guiding.finish_iteration(context.world, cut);
+            costs.stage("learning", self.guiding.bytes());
+        }
+        if lessons.judges {
+            let left_out = self.economy.left_out(context.world.has_hidden_light());
+            *context.counters.left_out.lock().unwrap_or_else(PoisonError::into_inner) = left_out;
+        }
+        true
+    }
+
+    /// Pixels of a band at most.
+    fn band_pixels(&self) -> u64 {
+        self.techniques.memory_budget / BYTES_PER_PIXEL
+    }
+
+    /// The parts of the film that are made one after the other: each is clustered for itself, with all light paths. What
+    /// bridges bring to the lens may arrive anywhere, so theirs is one.
+    fn bands(&self, context: &Context) -> Vec<Rect> {
+        match self.techniques.bridges {
+            None => context.film.bands(self.band_pixels()),
+            Some(_) => vec![context.film.rect()],
+        }
+    }
+
+    /// Light paths of an iteration, if all are sampled.
+    fn most_light_paths(&self, context: &Context) -> f32 {
+        let wanted = (self.techniques.light_paths * context.film.rect().area() as f32).ceil();
+        wanted.min((LIGHT_PATHS_PER_PIXEL * self.band_pixels()).max(1) as f32)
+    }
+
+    /// All stages of a band up to the film. Returns `false` if it was stopped.
+    fn transport(
+        &mut self,
+        context: &Context,
+        index: u32,
+        light_paths: f32,
+        cut: &Cut,
+        costs: &mut StageCosts,
+    ) -> bool {
+        let Context { world, sensor, .. } = *context;
+        if !self.sample_camera(context, index, light_paths, cut) {
             return false;
         }
         costs.stage("sampling", self.samples.camera.bytes() + self.samples.light.bytes());
@@ -119,7 +184,16 @@ impl Segment {
         let edge = self.techniques.kernel.edge(context.completed);
         let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index));
         let all = Numbered { camera: &self.samples.camera.arrivals, light: &self.samples.light.arrivals };
-        if !self.samples.clusters.group(world, &grid, all, cut) {
+        // bridges may begin at any light arrival; the other estimators follow light paths to their ends
+        let needs_all = context.keep_all
+            || self.techniques.estimator != Estimator::LeaveOneOut
+            || self.techniques.bridges.is_some();
+        let clusters = &mut self.samples.clusters;
+        let is_done = match needs_all {
+            true => clusters.group(world, &grid, all, cut),
+            false => clusters.group_seen(world, &grid, all, cut),
+        };
+        if !is_done {
             return false;
         }
         costs.stage("clustering", self.samples.clusters.bytes());
@@ -256,16 +330,10 @@ impl Segment {
         !context.keep_all && self.techniques.can_do_without_light_paths()
     }
 
-    /// Learns from this iteration where light paths should begin and how many of them pay, by what they bring as a
-    /// share of what is shown. Returns the bytes that it took, if there was something to learn.
-    fn learn(&mut self, context: &Context, index: u32, cut: &Cut) -> Option<usize> {
-        let paths = self.samples.light.starts.len();
-        let guides = self.techniques.emission_guiding && self.guiding.finish_iteration(paths);
-        let judges = self.is_thrifty(context) && Economy::looks(index);
-        if !guides && !judges {
-            return None;
-        }
-        let shown = context.film.read_pass(Pass::Combined, context.film.rect()).ok()?;
+    /// Learns from a band where light paths should begin and how many of them pay, by what they bring as a share of what
+    /// is shown. Returns the bytes that it took.
+    fn learn(&mut self, context: &Context, band: Rect, lessons: &Lessons, cut: &Cut) -> usize {
+        let Ok(shown) = context.film.read_pass(Pass::Combined, band) else { return 0 };
         let shown: Vec<f32> =
             shown.chunks_exact(4).map(|c| luminance(Vec3::new(c[0], c[1], c[2])).max(0.0)).collect();
         let mean = shown.iter().map(|&l| f64::from(l)).sum::<f64>() / shown.len() as f64;
@@ -276,30 +344,25 @@ impl Segment {
             Some(Start { arrival: p.arrival?, passages: p.passages, worth })
         });
         let starts: Vec<Start> = starts.collect();
-        let world = context.world;
-        let sampled = self.samples.with(world, self.techniques.bridges.map(|_| &self.bridges));
+        let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
         let (weights, reflected, max_depth) = (&self.weights, &self.reflected, context.max_depth);
         let outcome = Outcome { sampled, weights, reflected, starts: &starts, max_depth };
-        if judges {
-            self.economy.judge(outcome, light_paths(self.techniques.light_paths, context) as u32, cut);
-            let left_out = &context.counters.left_out;
-            *left_out.lock().unwrap_or_else(PoisonError::into_inner) =
-                self.economy.left_out(world.has_hidden_light());
+        if lessons.judges {
+            self.economy.judge(outcome, lessons.light_paths, lessons.bands, cut);
         }
-        Some(if guides { self.guiding.learn(outcome, cut) } else { 0 })
+        if lessons.guides { self.guiding.learn(outcome, cut) } else { 0 }
     }
 
-    /// Segments of this iteration.
+    /// Segments of this band.
     fn segments(&self) -> usize {
         self.samples.camera.segments(self.primaries.len()) + self.samples.light.arrivals.len()
     }
 
-    /// One sample for every pixel.
-    fn gather(&self, context: &Context) {
-        let width = context.crop.width as usize;
+    /// One sample for every pixel of a band.
+    fn gather(&self, context: &Context, band: Rect) {
         let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
-        context.film.add_iteration(|x, y| {
-            let pixel = y as usize * width + x as usize;
+        context.film.add_to_band(band, |x, y| {
+            let pixel = band.index(x, y);
             let (p, splatted) = (&self.primaries[pixel], self.splats.get(pixel));
             let (reflected, direct) = match p.arrival.map(|a| a as usize) {
                 Some(a) => {
@@ -318,6 +381,6 @@ impl Segment {
                 first_hit: p.first_hit,
             }
         });
-        (context.tile_done)(context.film.rect());
+        (context.tile_done)(band);
     }
 }

@@ -122,6 +122,7 @@ struct Json {
     light_paths: f32,
     next_event: bool,
     emission_guiding: bool,
+    memory_budget: u32,
     camera_paths: bool,
     resolution: [u32; 2],
     crop: Option<[u32; 4]>,
@@ -151,6 +152,7 @@ impl Default for Json {
             light_paths: techniques.light_paths,
             next_event: techniques.next_event,
             emission_guiding: techniques.emission_guiding,
+            memory_budget: (techniques.memory_budget >> 20) as u32,
             camera_paths: techniques.camera_paths,
             resolution: [0, 0],
             crop: None,
@@ -200,6 +202,7 @@ impl Json {
             next_event: self.next_event,
             // what bridges bring is not among the lessons
             emission_guiding: self.emission_guiding && !has_bridges,
+            memory_budget: u64::from(self.memory_budget.max(1)) << 20,
             camera_paths: self.camera_paths,
             bridges: has_bridges.then_some(match self.bridges {
                 BridgeName::Uniform => Choice::Uniform,

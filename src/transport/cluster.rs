@@ -4,6 +4,7 @@ use super::Cut;
 use super::area::{Cell, FEW_POINTS, MANY_POINTS, MOST_POINTS};
 use super::grid::Grid;
 use super::store::Arrival;
+use super::unseen::{self, UNSEEN};
 use crate::math::sampler::hash;
 use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
@@ -45,6 +46,21 @@ pub struct Cluster {
 }
 
 impl Cluster {
+    /// The empty cluster of arrivals that do not count, of which one is given.
+    fn of_nobody(representative: u32) -> Self {
+        Self {
+            first: 0,
+            cameras: 0,
+            lights: 0,
+            area: 1.0,
+            inverse_area: 0.0,
+            class: SurfaceClass::Diffuse,
+            representative,
+            parted: None,
+            parts: 1,
+        }
+    }
+
     /// Places of the camera's arrivals.
     pub fn camera_places(&self) -> Range<usize> {
         self.first as usize..(self.first + self.cameras) as usize
@@ -75,7 +91,7 @@ pub struct Clusters {
     pub clusters: Vec<Cluster>,
     /// Numbers of the arrivals, cluster by cluster.
     pub order: Vec<u32>,
-    /// Place of every arrival in the order.
+    /// Place in the order of every arrival that is in a cluster.
     pub place: Vec<u32>,
     /// Cluster of every arrival.
     pub of: Vec<u32>,
@@ -109,15 +125,35 @@ impl<'a> Numbered<'a> {
 impl Clusters {
     /// Clusters the arrivals; areas are left to [`Clusters::measure`]. Returns `false` if it was stopped.
     pub fn group(&mut self, world: &World, grid: &Grid, all: Numbered, cut: &Cut) -> bool {
+        self.group_by_key(world, grid, all, false, cut)
+    }
+
+    /// The same, but light arrivals that no camera path has to do with are in a last cluster, which is empty.
+    pub fn group_seen(&mut self, world: &World, grid: &Grid, all: Numbered, cut: &Cut) -> bool {
+        self.group_by_key(world, grid, all, true, cut)
+    }
+
+    fn group_by_key(
+        &mut self,
+        world: &World,
+        grid: &Grid,
+        all: Numbered,
+        only_seen: bool,
+        cut: &Cut,
+    ) -> bool {
         let n = all.len();
         self.keys.clear();
         self.keys.par_extend((0..n as u32).into_par_iter().map(|i| (grid.key(all.get(i)), i)));
         if cut.is_raised() {
             return false;
         }
+        if only_seen {
+            unseen::sort_out(&mut self.keys, all);
+        }
         // numbers make the order unique, so it does not depend on the threads
         self.keys.par_sort_unstable();
-        let groups: Vec<&[(u64, u32)]> = self.keys.chunk_by(|a, b| a.0 == b.0).collect();
+        let counting = self.keys.partition_point(|k| k.0 != UNSEEN);
+        let groups: Vec<&[(u64, u32)]> = self.keys[..counting].chunk_by(|a, b| a.0 == b.0).collect();
         let hidden: Vec<bool> = groups
             .par_iter()
             .with_min_len(GRAIN)
@@ -145,11 +181,13 @@ impl Clusters {
             at += group.len();
             layout.add(group, hidden, all.get(group[0].1).class);
         }
+        let nobodys = layout.clusters.len() as u32;
+        layout.clusters.extend(self.keys.get(counting).map(|&(_, i)| Cluster::of_nobody(i)));
         (self.order, self.clusters) = (layout.order, layout.clusters);
         self.place.clear();
-        self.place.resize(n, 0);
+        self.place.resize(n, u32::MAX);
         self.of.clear();
-        self.of.resize(n, 0);
+        self.of.resize(n, nobodys);
         for (c, cluster) in (0..).zip(&self.clusters) {
             for place in cluster.first..cluster.first + cluster.cameras + cluster.lights {
                 let i = self.order[place as usize] as usize;
@@ -251,6 +289,9 @@ impl Layout {
 
 /// The areas of a cluster, each part of a voxel's having its share. Returns how many points were looked at.
 fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut Cluster, areas: Areas) -> u64 {
+    if members.is_empty() {
+        return 0;
+    }
     let representative = all.get(c.representative);
     let voxel = grid.voxel(representative.position);
     let parts = c.parts as f32;

@@ -102,8 +102,9 @@ impl Economy {
         (share < 1.0).then(|| format!("light paths, {percent:.0} % of them in most iterations: {why}"))
     }
 
-    /// Judges by an iteration that sampled all light paths, which were so many.
-    pub fn judge(&mut self, o: Outcome, light_paths: u32, cut: &Cut) {
+    /// Judges by an iteration that sampled all light paths, which were so many, or by one of its bands, which share their
+    /// cost.
+    pub fn judge(&mut self, o: Outcome, light_paths: f32, bands: usize, cut: &Cut) {
         let found = errors(o, cut);
         if cut.is_raised() || found.iter().any(|v| v.is_nan()) {
             return;
@@ -112,7 +113,7 @@ impl Economy {
         self.errors.iter_mut().zip(found).for_each(|(sum, v)| *sum += v);
         let Outcome { sampled: s, starts, .. } = o;
         let camera = (s.camera.arrivals.len() + starts.len()) as f64;
-        let light = s.light.arrivals.len() as f64 + f64::from(light_paths);
+        let light = (s.light.arrivals.len() as f64 + f64::from(light_paths)) / bands as f64;
         let probes = PROBE * s.clusters.probes as f64;
         let cost = |r: f64| camera + r * light + r.powf(PROBE_GROWTH) * probes;
         let all = SHARES.len() - 1;

@@ -11,8 +11,8 @@ use super::photons::photon_values;
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use super::{Cut, store::LightStore};
-use crate::shading::SurfaceClass;
 use crate::shading::emitters::{EmissionGuide, Lesson};
+use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -59,16 +59,16 @@ pub struct Outcome<'a> {
 }
 
 impl Guiding {
-    /// An iteration, with so many light paths that arrived, is over: says whether it has something to teach. The guide
+    /// An iteration begins, with so many light paths that arrived: says whether it has something to teach. The guide
     /// changes after the first, and whenever the number of iterations has doubled; the last ones before teach
     /// it, as many as are needed.
-    pub fn finish_iteration(&mut self, paths: usize) -> bool {
+    pub fn begin_iteration(&mut self, paths: usize) -> bool {
         self.iterations += 1;
         let left = self.iterations.next_power_of_two() - self.iterations;
         paths > 0 && left < LAST && left as usize * paths < MOST
     }
 
-    /// Learns from an iteration. Returns the bytes that it took.
+    /// Learns from an iteration, or from one of its bands. Returns the bytes that it took.
     pub fn learn(&mut self, o: Outcome, cut: &Cut) -> usize {
         let worth = worth_of_paths(o, cut);
         let stride = worth.len().div_ceil(MOST).max(1);
@@ -77,11 +77,19 @@ impl Guiding {
             + worth.len() * size_of::<f32>();
         let chosen = o.sampled.light.starts.iter().zip(worth).step_by(stride);
         self.lessons.extend(chosen.map(|(start, worth)| Lesson { draw: start.draw, worth }));
-        let bytes = bytes + self.lessons.capacity() * size_of::<Lesson>();
+        bytes + self.bytes()
+    }
+
+    /// An iteration that teaches something is over.
+    pub fn finish_iteration(&mut self, world: &World, cut: &Cut) {
         if self.iterations.is_power_of_two() && !cut.is_raised() {
-            self.guide = o.sampled.world.emission_guide(std::mem::take(&mut self.lessons));
+            self.guide = world.emission_guide(std::mem::take(&mut self.lessons));
         }
-        bytes + self.guide.bytes()
+    }
+
+    /// Memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.lessons.capacity() * size_of::<Lesson>() + self.guide.bytes()
     }
 }
 

@@ -21,6 +21,7 @@ pub mod report;
 pub mod store;
 #[cfg(test)]
 mod testing;
+mod unseen;
 pub mod walk;
 pub mod weigh;
 mod whole_path;
@@ -66,6 +67,8 @@ pub struct Techniques {
     pub bridges: Option<bridge::Choice>,
     /// Whether light paths learn where to begin.
     pub emission_guiding: bool,
+    /// What the segments of camera paths may take at a time, about, bytes: larger pictures are made in bands.
+    pub memory_budget: u64,
 }
 
 impl Techniques {
@@ -85,6 +88,7 @@ impl Default for Techniques {
             camera_paths: true,
             bridges: None,
             emission_guiding: true,
+            memory_budget: 1 << 30,
         }
     }
 }

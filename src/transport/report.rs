@@ -43,8 +43,7 @@ impl Reflected {
 fn sizes(s: Sampled) -> (Vec<u64>, u32) {
     let mut sizes = Vec::new();
     let mut largest = 0;
-    for c in &s.clusters.clusters {
-        let n = c.cameras + c.lights;
+    for n in s.clusters.clusters.iter().map(|c| c.cameras + c.lights).filter(|&n| n > 0) {
         largest = largest.max(n);
         let k = n.ilog2() as usize;
         if sizes.len() <= k {

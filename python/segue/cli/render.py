@@ -64,6 +64,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="edge of the kernel in the first iteration (default: 4)",
     )
     add(
+        "--memory-budget",
+        type=arguments.count,
+        metavar="MIB",
+        help="what the segments of camera paths may take at a time, about (default: 1024); larger "
+        "pictures are made in bands, which takes longer",
+    )
+    add(
         "--estimator",
         choices=("leave-one-out", "literal"),
         help="how the segment method uses light segments: consistently (default), or by the "
@@ -134,6 +141,8 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
         settings["kernel"] = options.kernel
     if options.kernel_size:
         settings["kernel_size"] = options.kernel_size
+    if options.memory_budget:
+        settings["memory_budget"] = options.memory_budget
     if options.estimator:
         settings["estimator"] = options.estimator
     if options.bridges:
