@@ -5,11 +5,13 @@ use super::store::Arrival;
 use crate::math::sampler::{hash, hash_unit};
 use crate::shading::{SurfaceClass, World};
 use glam::{Vec2, Vec3};
+use std::ops::RangeInclusive;
 
-/// Coverage points that have to lie on the cluster, where photons are divided by its area.
-pub const MANY_POINTS: u32 = 8;
+/// Coverage points that have to lie on the cluster, where photons are divided by its area: as many as there are photons,
+/// within these bounds, so that they add little to the noise of the photons' number.
+pub const POINTS_OF_PHOTONS: RangeInclusive<u32> = 4..=32;
 /// The same where the area only decides how much each technique counts.
-pub const FEW_POINTS: u32 = 3;
+pub const FEW_POINTS: u32 = 1;
 /// The same where areas stand in densities themselves, so that both an area and its reciprocal have to be right.
 pub const MOST_POINTS: u32 = 64;
 /// Most points that are tried to find them.
@@ -97,6 +99,8 @@ impl Cell<'_> {
                 std::mem::swap(&mut top, &mut bottom);
             }
             let (mut is_first, mut is_there) = (true, false);
+            // the upper side of something too thin for points above its lower side to be inside: depth, orientation
+            let mut upper: Option<(f32, bool)> = None;
             world.for_each_surface(top, bottom, LAYERS, |p| {
                 // where nothing divides the cluster, only what bends away or lies below something may be out of sight
                 let rise = (p.place.position - at).dot(n);
@@ -111,7 +115,11 @@ impl Cell<'_> {
                     && self.grid.bin(ns) == bin
                     && self.grid.voxel(p.place.position) == self.voxel
                     && (!is_doubtful || hidden(p.place.position, ns) == self.parted.unwrap_or(false));
-                if there {
+                let depth = (p.place.position[axis] - top[axis]).abs();
+                let faces = p.ns.dot(n) > 0.0;
+                let is_lower = upper.is_some_and(|(d, f)| f != faces && depth - d < NEAR_PLANE * edge);
+                upper = (there && !is_lower).then_some((depth, faces));
+                if there && !is_lower {
                     is_there = true;
                     // a surface seen edge-on would count without bound
                     let slope = 1.0 / p.place.normal[axis].abs().max(0.05);

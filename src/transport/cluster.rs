@@ -1,7 +1,7 @@
 //! Clusters: arrivals that share a voxel, a bin of normals and a class of surface.
 
 use super::Cut;
-use super::area::{Cell, FEW_POINTS, MANY_POINTS, MOST_POINTS};
+use super::area::{Cell, FEW_POINTS, MOST_POINTS, POINTS_OF_PHOTONS};
 use super::grid::Grid;
 use super::store::Arrival;
 use super::unseen::{self, UNSEEN};
@@ -311,7 +311,8 @@ fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut C
     let is_true = areas == Areas::True;
     c.area = estimate(if is_true { MOST_POINTS } else { FEW_POINTS });
     if is_true || (c.cameras > 0 && c.lights > 0) {
-        c.inverse_area = 1.0 / estimate(MANY_POINTS);
+        let (least, most) = POINTS_OF_PHOTONS.into_inner();
+        c.inverse_area = 1.0 / estimate(c.lights.clamp(least, most));
     }
     probes
 }

@@ -112,6 +112,22 @@ fn areas_on_a_plane_at_an_edge_and_in_a_corner() {
 }
 
 #[test]
+fn of_a_thin_plate_one_side_counts() {
+    let mut s = Stage::default();
+    let grey = s.material(GREY);
+    s.quad([[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]], grey);
+    // its lower side, so near that what is lifted off it is above both
+    let z = -0.03 * EDGE;
+    s.quad([[0., 0., z], [0., 1., z], [1., 1., z], [1., 0., z]], grey);
+    let world = world(&mut s);
+    let sides = [Vec3::Z];
+    let [found, _] =
+        bias(&world, 24, |seed| photons(&world, seed, &sides, 20_000), &|g, a| of_octant(g, a, &sides));
+    println!("thin plate: coverage {:+.3} %", 100.0 * (found - 1.0));
+    assert!((found - 1.0).abs() < 4e-3, "{found}");
+}
+
+#[test]
 fn a_tilted_plane_is_cut_exactly() {
     let mut s = Stage::default();
     let grey = s.material(GREY);

@@ -35,7 +35,8 @@ fn render(s: &Stage, side: u32, samples: u32, settings: &str) -> (f64, Report) {
 #[test]
 fn a_million_arrivals_share_a_few_clusters() {
     let s = furnace(DIFFUSE);
-    let (mean, graph) = render(&s, 1000, 1, r#","kernel":"fixed","kernel_size":1000,"light_paths":0,"memory_budget":4096"#);
+    let (mean, graph) =
+        render(&s, 1000, 1, r#","kernel":"fixed","kernel_size":1000,"light_paths":0,"memory_budget":4096"#);
     assert!(graph.largest >= 1_000_000, "{graph:?}");
     assert_close("a million", mean, 2.0, 1.5e-3);
 }
