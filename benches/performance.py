@@ -1,0 +1,154 @@
+"""docs/performance.md: `segment` beside Cycles, LuxCore and Mitsuba on the same scenes for the same time.
+
+Needs the scenes, references and harness that are shared between renderers (SEGUE_SHARED, or ../shared beside the
+checkout) and two Python environments: PEERS_BPY_PYTHON with `bpy`, PEERS_PYTHON with `mitsuba`, `pyluxcore`,
+`OpenImageIO` and `matplotlib`. Without them it says so and does nothing. Run:
+.venv/bin/python benches/performance.py [SCENE ...]
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from segue import Render, images, usd
+
+ROOT = Path(__file__).parent.parent
+SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers"
+SCENES = ("cornell", "furnace", "glossy_box", "ajar_door", "cornell_glass", "lamp")
+PEERS = (
+    "cycles-base",
+    "cycles-guided",
+    "mitsuba-path",
+    "luxcore-path",
+    "luxcore-bidir",
+    "luxcore-bidir-metro",
+    "luxcore-bidirvm-random",
+)
+OURS = ("segment", "path")
+SECONDS = float(os.environ.get("SEGUE_SECONDS", "15"))
+#: For the second reference.
+REFERENCE_SECONDS = 4.0 * SECONDS
+THREADS = 2
+HEAD = """# Beside Cycles, LuxCore and Mitsuba
+
+relMSE after {seconds:g} seconds of {threads} threads (processor seconds over threads; loading, building and compiling left out) at
+256 × 256, one seed each, one after the other in one run of `benches/performance.py`. The scenes are the same for all (`peers/usd`).
+
+Each squared error is the product of the differences from two independent references, `(a - r1)(a - r2)`, so that the references' own noise
+does not count: `r1` was made by other renderers, `r2` is four times as much of `segment` with a fixed kernel of a third of a pixel. It is divided by the
+squared mean of both over 5 × 5 pixels. What was measured at a slightly other time is scaled as one over time. A picture whose error is bias
+(kernels, or light that a method cannot find) gains less from more time.
+
+| scene | {heads} | best of the others | its error over `segment`'s |
+|---|{lines}---|---|
+"""
+
+
+def smooth(picture: np.ndarray, radius: int = 2) -> np.ndarray:
+    """Means over squares of pixels."""
+    width = 2 * radius + 1
+    padded = np.pad(picture, ((radius, radius), (radius, radius), (0, 0)), mode="edge")
+    squares = np.lib.stride_tricks.sliding_window_view(
+        padded, (width, width), axis=(0, 1)
+    )
+    return squares.mean(axis=(-2, -1))
+
+
+def relative_error(picture: np.ndarray, first: np.ndarray, second: np.ndarray) -> float:
+    """Relative mean squared error that neither reference's noise is part of."""
+    mean = (first + second) / 2
+    scale = smooth(mean) ** 2 + (0.01 * mean.mean()) ** 2
+    return float(((picture - first) * (picture - second) / scale).mean())
+
+
+def ours(scene: Any, **settings: Any) -> tuple[np.ndarray, float]:
+    """A picture, and the processor seconds of a thread that it took."""
+    common = {"resolution": [256, 256], "threads": THREADS}
+    job = Render(scene, {**common, **settings})
+    job.run()
+    picture = job.read_pass("Combined")[..., :3].astype(np.float64)
+    return picture, job.stats()["cpu_seconds"] / THREADS
+
+
+def theirs(harness: Path, name: str) -> dict[str, tuple[np.ndarray, float]]:
+    """Pictures of the other renderers and the processor seconds of a thread that they took."""
+    command = [
+        os.environ["PEERS_PYTHON"],
+        "peers.py",
+        name,
+        "--peers",
+        ",".join(PEERS),
+    ]
+    command += ["--time", f"{SECONDS:g}"]
+    environment = {**os.environ, "H_THREADS": str(THREADS)}
+    subprocess.run(
+        command,
+        check=False,
+        cwd=harness,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+    )
+    records = json.loads((harness / "results" / name / "records.json").read_text())
+    return {
+        r["peer"]: (
+            images.read_rgb(Path(r["exr"])).astype(np.float64),
+            r["cpu"] / THREADS,
+        )
+        for r in records
+    }
+
+
+def row(harness: Path, name: str) -> str:
+    """The table's row of a scene."""
+    scene = usd.load(SHARED / "usd" / f"{name}.usda").scene
+    first = images.read_rgb(SHARED / "refs" / f"{name}.exr").astype(np.float64)
+    sharp = {"kernel": "fixed", "kernel_size": 0.35, "seed": 2**30}
+    second, _ = ours(scene, time=REFERENCE_SECONDS, **sharp)
+    found = {m: ours(scene, integrator=m, time=SECONDS) for m in OURS}
+    found |= theirs(harness, name)
+    errors = {
+        method: relative_error(picture, first, second) * seconds / SECONDS
+        for method, (picture, seconds) in found.items()
+    }
+    best = min((m for m in PEERS if m in errors), key=errors.__getitem__, default=None)
+    cells = [f"{errors[m]:.2g}" if m in errors else "failed" for m in (*OURS, *PEERS)]
+    cells += [best or "none"]
+    cells += [f"{errors[best] / errors['segment']:.2g}" if best else ""]
+    return f"| {name} | " + " | ".join(cells) + " |"
+
+
+def main(names: list[str]) -> int:
+    """Writes the table."""
+    missing = [v for v in ("PEERS_BPY_PYTHON", "PEERS_PYTHON") if v not in os.environ]
+    if missing or not SHARED.exists():
+        print(f"skipped: {', '.join(missing) or SHARED} is not there")
+        return 0
+    methods = (*OURS, *PEERS)
+    with tempfile.TemporaryDirectory() as folder:
+        # the harness writes beside itself
+        harness = Path(folder) / "peers"
+        shutil.copytree(SHARED, harness)
+        rows = []
+        for name in names or SCENES:
+            rows.append(row(harness, name))
+            print(rows[-1], flush=True)
+    head = HEAD.format(
+        seconds=SECONDS,
+        threads=THREADS,
+        heads=" | ".join(methods),
+        lines="---|" * len(methods),
+    )
+    (ROOT / "docs" / "performance.md").write_text(head + "\n".join(rows) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
