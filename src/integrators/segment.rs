@@ -122,8 +122,7 @@ impl Segment {
             bands: bands.len(),
         };
         for band in bands {
-            let corner = (context.crop.x + band.x, context.crop.y + band.y);
-            let crop = Rect::new(corner.0, corner.1, band.width, band.height);
+            let crop = Rect { x: context.crop.x + band.x, y: context.crop.y + band.y, ..band };
             let of_band = Context { crop, ..*context };
             if !self.transport(&of_band, index, light_paths, cut, costs) {
                 return false;

@@ -107,7 +107,8 @@ impl Cell<'_> {
                 let is_doubtful = self.parted.is_some() || !is_first || rise.abs() > NEAR_PLANE * edge;
                 is_first = false;
                 let class = world.class(p.material);
-                let ns = match class == SurfaceClass::Transmitting || p.ns.dot(n) > 0.0 {
+                let faces = p.ns.dot(n) > 0.0;
+                let ns = match class == SurfaceClass::Transmitting || faces {
                     true => p.ns,
                     false => -p.ns,
                 };
@@ -116,7 +117,6 @@ impl Cell<'_> {
                     && self.grid.voxel(p.place.position) == self.voxel
                     && (!is_doubtful || hidden(p.place.position, ns) == self.parted.unwrap_or(false));
                 let depth = (p.place.position[axis] - top[axis]).abs();
-                let faces = p.ns.dot(n) > 0.0;
                 let is_lower = upper.is_some_and(|(d, f)| f != faces && depth - d < NEAR_PLANE * edge);
                 upper = (there && !is_lower).then_some((depth, faces));
                 if there && !is_lower {
