@@ -7,7 +7,7 @@
 use super::{Context, Integrator, IterationEnd, record};
 use crate::film::{Sample, SharedTile};
 use crate::math::Sampler;
-use crate::shading::bsdf::{Bsdf, Walk};
+use crate::shading::bsdf::{Among, Bsdf, Sight, Walk};
 use crate::shading::emitters::Receiver;
 use crate::shading::lobes::Density;
 use crate::shading::{CameraRay, LightPoint, Piece, Shaded, SurfacePoint, World};
@@ -165,11 +165,12 @@ impl PathWalk<'_, '_> {
             let wo = -piece.direction;
             let bsdf = &vertex.bsdf;
             let receiver = hit.receiver(bsdf, wo);
+            let Some(sight) = bsdf.sight(wo, Among::All) else { return };
             if bsdf.has_smooth() {
-                let direct = self.next_event(&hit, &receiver, bsdf, wo) * throughput.radiance();
+                let direct = self.next_event(&hit, &receiver, bsdf, &sight, wo) * throughput.radiance();
                 record(sample, depth + 1, direct);
             }
-            let Some(s) = bsdf.sample(wo, Walk::Camera, self.sampler.next_3d()) else { return };
+            let Some(s) = sight.sample(Walk::Camera, self.sampler.next_3d()) else { return };
             throughput.weight *= s.weight();
             throughput.basic_to_radiance /= s.eta * s.eta;
             origin = match s.pdf {
@@ -203,18 +204,26 @@ impl PathWalk<'_, '_> {
     }
 
     /// Light that reaches the vertex from a drawn point of a light, scattered towards `wo`.
-    fn next_event(&mut self, hit: &SurfacePoint, receiver: &Receiver, bsdf: &Bsdf, wo: Vec3) -> Vec3 {
+    fn next_event(
+        &mut self,
+        hit: &SurfacePoint,
+        receiver: &Receiver,
+        bsdf: &Bsdf,
+        sight: &Sight,
+        wo: Vec3,
+    ) -> Vec3 {
         let u = self.sampler.next_3d();
         let world = self.context.world;
         let Some(light) = world.sample_light(receiver, u) else { return Vec3::ZERO };
         let cos = hit.place.normal.dot(light.direction).abs();
-        let f = bsdf.eval(wo, light.direction) * cos;
+        let (f, pdf) = sight.look(light.direction);
+        let f = f * cos;
         if f == Vec3::ZERO {
             return Vec3::ZERO;
         }
         let weight = match light.is_delta {
             true => 1.0,
-            false => power_heuristic(light.pdf, bsdf.pdf(wo, light.direction).0 * cos),
+            false => power_heuristic(light.pdf, pdf.0 * cos),
         };
         // the light's radiance is basic radiance once divided by the squared index of its own side
         let to_radiance = bsdf.relative_index(wo, light.direction).powi(-2);

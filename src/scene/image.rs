@@ -2,9 +2,9 @@
 
 use super::{SceneError, Warnings};
 use crate::math::color::srgb_to_linear;
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use half::f16;
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
 /// Pixel values as they came, row 0 on top, channels interleaved.
 #[derive(Clone, Debug)]
@@ -127,29 +127,18 @@ impl Image {
     /// The decoded texel: linear colour and alpha. Grey is spread over the colour channels; a missing
     /// alpha is one. `x` grows to the right, `y` downwards; both must be inside.
     pub fn texel(&self, x: u32, y: u32) -> Vec4 {
-        let i = (y as usize * self.width as usize + x as usize) * self.channels as usize;
         let n = self.channels as usize;
-        let mut v = [0.0; 4];
+        let i = (y as usize * self.width as usize + x as usize) * n;
+        let is_srgb = self.encoding == Encoding::Srgb;
+        let curve = |v: f32| if is_srgb { srgb_to_linear(v) } else { v };
         match &self.pixels {
             Pixels::U8(p) => {
-                let curve = srgb_table();
-                let alpha = if n == 2 || n == 4 { n - 1 } else { n };
-                for (c, (out, &byte)) in v.iter_mut().zip(&p[i..i + n]).enumerate() {
-                    *out = match self.encoding == Encoding::Srgb && c != alpha {
-                        true => curve[byte as usize],
-                        false => byte as f32 / 255.0,
-                    };
-                }
-                return spread(v, n);
+                let table = byte_table(self.encoding);
+                spread(&p[i..i + n], |v| table[v as usize], |v| f32::from(v) / 255.0)
             }
-            Pixels::U16(p) => v.iter_mut().zip(&p[i..i + n]).for_each(|(o, &x)| *o = x as f32 / 65535.0),
-            Pixels::F16(p) => v.iter_mut().zip(&p[i..i + n]).for_each(|(o, &x)| *o = x.to_f32()),
-            Pixels::F32(p) => v[..n].copy_from_slice(&p[i..i + n]),
-        }
-        let v = spread(v, n);
-        match self.encoding {
-            Encoding::Linear => v,
-            Encoding::Srgb => Vec4::new(srgb_to_linear(v.x), srgb_to_linear(v.y), srgb_to_linear(v.z), v.w),
+            Pixels::U16(p) => spread(&p[i..i + n], |v| curve(unit16(v)), unit16),
+            Pixels::F16(p) => spread(&p[i..i + n], |v| curve(v.to_f32()), f16::to_f32),
+            Pixels::F32(p) => spread(&p[i..i + n], curve, |v| v),
         }
     }
 
@@ -164,18 +153,29 @@ impl Image {
     }
 }
 
-fn spread(v: [f32; 4], channels: usize) -> Vec4 {
-    match channels {
-        1 => Vec4::new(v[0], v[0], v[0], 1.0),
-        2 => Vec4::new(v[0], v[0], v[0], v[1]),
-        3 => Vec4::new(v[0], v[1], v[2], 1.0),
-        _ => Vec4::from_array(v),
+fn unit16(v: u16) -> f32 {
+    f32::from(v) / 65535.0
+}
+
+/// The channels of a texel as RGBA.
+#[inline]
+fn spread<T: Copy>(texel: &[T], color: impl Fn(T) -> f32, alpha: impl Fn(T) -> f32) -> Vec4 {
+    match *texel {
+        [grey] => Vec3::splat(color(grey)).extend(1.0),
+        [grey, a] => Vec3::splat(color(grey)).extend(alpha(a)),
+        [r, g, b] => Vec4::new(color(r), color(g), color(b), 1.0),
+        [r, g, b, a, ..] => Vec4::new(color(r), color(g), color(b), alpha(a)),
+        [] => Vec4::W,
     }
 }
 
-fn srgb_table() -> &'static [f32; 256] {
-    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
-    TABLE.get_or_init(|| std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0)))
+/// Linear values of bytes.
+fn byte_table(encoding: Encoding) -> &'static [f32; 256] {
+    static TABLES: LazyLock<[[f32; 256]; 2]> = LazyLock::new(|| {
+        let linear: [f32; 256] = std::array::from_fn(|i| i as f32 / 255.0);
+        [linear, linear.map(srgb_to_linear)]
+    });
+    &TABLES[usize::from(encoding == Encoding::Srgb)]
 }
 
 #[cfg(test)]

@@ -148,6 +148,10 @@ where
 
 /// Texel index of a coordinate, `None` for black.
 fn wrap(i: i64, size: i64, mode: Wrap) -> Option<u32> {
+    // by far the usual case, and a division saved
+    if (0..size).contains(&i) {
+        return Some(i as u32);
+    }
     let k = match mode {
         Wrap::Repeat => i.rem_euclid(size),
         Wrap::Clamp => i.clamp(0, size - 1),
@@ -155,7 +159,6 @@ fn wrap(i: i64, size: i64, mode: Wrap) -> Option<u32> {
             let k = i.rem_euclid(2 * size);
             k.min(2 * size - 1 - k)
         }
-        Wrap::Black if (0..size).contains(&i) => i,
         Wrap::Black => return None,
     };
     Some(k as u32)
@@ -166,21 +169,22 @@ fn sample(image: &Image, t: &ImageTexture, st: Vec2) -> Vec4 {
         return Vec4::ZERO;
     }
     let (w, h) = (image.width() as i64, image.height() as i64);
-    let texel = |x: i64, y: i64| match (wrap(x, w, t.wrap[0]), wrap(y, h, t.wrap[1])) {
+    let (column, row) = (|x: i64| wrap(x, w, t.wrap[0]), |y: i64| wrap(y, h, t.wrap[1]));
+    let texel = |x: Option<u32>, y: Option<u32>| match (x, y) {
         (Some(x), Some(y)) => image.texel(x, y),
         _ => Vec4::ZERO,
     };
     // row 0 is the top row, and t grows upwards; far coordinates saturate, which no picture can show
     let p = Vec2::new(st.x * w as f32, (1.0 - st.y) * h as f32).clamp(Vec2::splat(-1e12), Vec2::splat(1e12));
     match t.filter {
-        Reconstruction::Closest => texel(p.x.floor() as i64, p.y.floor() as i64),
+        Reconstruction::Closest => texel(column(p.x.floor() as i64), row(p.y.floor() as i64)),
         Reconstruction::Linear => {
             let q = p - 0.5;
             let corner = q.floor();
             let f = q - corner;
             let (x, y) = (corner.x as i64, corner.y as i64);
-            let top = texel(x, y).lerp(texel(x + 1, y), f.x);
-            let bottom = texel(x, y + 1).lerp(texel(x + 1, y + 1), f.x);
+            let (left, right) = (column(x), column(x + 1));
+            let [top, bottom] = [row(y), row(y + 1)].map(|y| texel(left, y).lerp(texel(right, y), f.x));
             top.lerp(bottom, f.y)
         }
     }

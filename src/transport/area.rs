@@ -16,6 +16,8 @@ pub const FEW_POINTS: u32 = 1;
 pub const MOST_POINTS: u32 = 64;
 /// Most points that are tried to find them.
 const MOST_TRIES: u32 = 256;
+/// The same for a rough estimate.
+const FEW_TRIES: u32 = 32;
 /// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
 const NEAR_PLANE: f32 = 0.05;
 /// Most surfaces that are looked at below one coverage point.
@@ -87,7 +89,8 @@ impl Cell<'_> {
         let at = self.representative.position;
         let seed = hash(wanted, hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits())));
         let (mut sum, mut squares, mut tries, mut found) = (0.0, 0.0, 0, 0);
-        while tries < MOST_TRIES && found < wanted {
+        let most = if wanted == FEW_POINTS { FEW_TRIES } else { MOST_TRIES };
+        while tries < most && found < wanted {
             let u = Vec2::new(hash_unit(seed, 2 * tries), hash_unit(seed, 2 * tries + 1));
             tries += 1;
             let mut top = low;

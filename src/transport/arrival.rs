@@ -2,7 +2,7 @@
 
 use super::store::Arrival;
 use super::walk::End;
-use crate::shading::bsdf::Bsdf;
+use crate::shading::bsdf::{Bsdf, Sight};
 use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
 
@@ -12,7 +12,11 @@ const LEAST: f32 = 0.05;
 /// Probability `q` with which a path goes on from a surface: the albedo of what is continuous, given that the
 /// segment ended there.
 pub fn survival(world: &World, bsdf: &Bsdf, wo: Vec3, end_probability: f32) -> f32 {
-    bounded(world, bsdf.continuous_albedo(wo).max_element() / end_probability)
+    survival_of(world, bsdf.continuous_albedo(wo), end_probability)
+}
+
+fn survival_of(world: &World, albedo: Vec3, end_probability: f32) -> f32 {
+    bounded(world, albedo.max_element() / end_probability)
 }
 
 fn bounded(world: &World, albedo: f32) -> f32 {
@@ -35,13 +39,14 @@ pub fn early_survival(q: f32) -> f32 {
     q.sqrt()
 }
 
-/// The end of a segment as it is stored; `goes_on` is the caller's to set.
-pub fn arrival(world: &World, end: &End) -> Arrival {
+/// The end of a segment as it is stored; `goes_on` is the caller's to set. `sight`: of its continuous lobes from where
+/// the segment came.
+pub fn arrival(world: &World, end: &End, sight: Option<&Sight>) -> Arrival {
     let End { hit, vertex, wo, end_probability, .. } = end;
     let class = world.class(hit.material);
     let facing = if hit.place.normal.dot(*wo) < 0.0 { -hit.ns } else { hit.ns };
     let (reflectance, back_pdf) = match (class, vertex.bsdf.lambert()) {
-        (SurfaceClass::Diffuse, Some((r, _))) => (r, vertex.bsdf.continuous_pdf(*wo, *wo).0),
+        (SurfaceClass::Diffuse, Some((r, _))) => (r, sight.map_or(0.0, |s| s.pdf(*wo).0)),
         _ => (Vec3::ZERO, 0.0),
     };
     Arrival {
@@ -51,7 +56,7 @@ pub fn arrival(world: &World, end: &End) -> Arrival {
         at: hit.address(),
         reflectance,
         back_pdf,
-        survival: survival(world, &vertex.bsdf, *wo, *end_probability),
+        survival: survival_of(world, sight.map_or(Vec3::ZERO, Sight::continuous_albedo), *end_probability),
         class,
         goes_on: false,
     }

@@ -6,7 +6,8 @@ use super::store::{CameraStore, EmissionHit, NextEvent, Outgoing};
 use super::walk::{Chain, End, Follow, Witness};
 use crate::film::FirstHit;
 use crate::math::Sampler;
-use crate::shading::bsdf::Walk;
+use crate::math::density::ProjectedPdf;
+use crate::shading::bsdf::{Sight, Walk};
 use crate::shading::emitters::{EmissionGuide, Receiver};
 use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
 use glam::Vec3;
@@ -203,27 +204,30 @@ impl CameraSampler<'_> {
         let follow = Follow { from_camera: false, ..follow };
         loop {
             let index = store.arrivals.len();
-            let mut arrived = arrival(self.world, &end);
+            let sight = end.sight();
+            let mut arrived = arrival(self.world, &end, sight.as_ref());
             if !self.goes_on {
                 arrived.survival = 0.0;
             } else if index - first < EARLY {
                 arrived.survival = early_survival(arrived.survival);
             }
             let receiver = end.hit.receiver(&end.vertex.bsdf, end.wo);
-            let next_event = match self.next_event {
-                true => self.next_event(&end, &receiver, inverse_n2, sampler, rays),
-                false => NextEvent::default(),
+            let (next_event, value) = match (self.next_event, &sight) {
+                (true, Some(sight)) => {
+                    let drawn = self.next_event(&end, sight, &receiver, inverse_n2, sampler, rays);
+                    drawn.unwrap_or_default()
+                }
+                _ => Default::default(),
             };
             let sound = next_event.light.is_finite() && next_event.next_event_pdf.is_finite();
             store.dropped += u64::from(!sound);
             let next_event = if sound { next_event } else { NextEvent::default() };
-            let bsdf = &end.vertex.bsdf;
-            own.see_next_event(&next_event, arrived.survival, |direction| bsdf.eval(end.wo, direction));
+            own.see_next_event(&next_event, arrived.survival, value);
             store.next_events.push(next_event);
             store.inverse_n2.push(inverse_n2);
             let u = sampler.next_3d();
             let goes_on = sampler.next_1d() < arrived.survival;
-            let sample = if goes_on { bsdf.sample_continuous(end.wo, Walk::Camera, u) } else { None };
+            let sample = if goes_on { sight.and_then(|s| s.sample(Walk::Camera, u)) } else { None };
             arrived.goes_on = sample.is_some();
             let survival = arrived.survival;
             store.arrivals.push(arrived);
@@ -272,28 +276,29 @@ impl CameraSampler<'_> {
         primary
     }
 
-    /// A next-event segment; its light is zero where none arrives.
+    /// A next-event segment along which light arrives, and the value of the lobes.
     fn next_event(
         &self,
         end: &End,
+        sight: &Sight,
         receiver: &Receiver,
         inverse_n2: f32,
         sampler: &mut Sampler,
         rays: &mut u64,
-    ) -> NextEvent {
+    ) -> Option<(NextEvent, Vec3)> {
         let u = sampler.next_3d();
-        let Some(light) = self.world.sample_light(receiver, u) else { return NextEvent::default() };
+        let light = self.world.sample_light(receiver, u)?;
         let bsdf = &end.vertex.bsdf;
         let cos = end.hit.place.normal.dot(light.direction).abs();
-        let pdf = bsdf.continuous_pdf(end.wo, light.direction).0;
+        let (value, ProjectedPdf(pdf)) = sight.look(light.direction);
         // arrivals from the other side of a surface that transmits share its cluster, and may use what this one cannot
         let is_shared = self.world.class(end.hit.material) == SurfaceClass::Transmitting;
         if cos <= 0.0 || (pdf <= 0.0 && !is_shared) {
-            return NextEvent::default();
+            return None;
         }
         let visible = self.world.transmittance(&end.hit, &light, rays);
         if visible == Vec3::ZERO || light.radiance == Vec3::ZERO {
-            return NextEvent::default();
+            return None;
         }
         let index = bsdf.relative_index(end.wo, light.direction);
         let arriving = light.radiance * visible * (inverse_n2 / (index * index));
@@ -306,13 +311,14 @@ impl CameraSampler<'_> {
         };
         // a delta light counts by area, others by étendue
         let (light_cos, pdf_cos) = if light.is_delta { (cos, 1.0) } else { (1.0, cos) };
-        NextEvent {
+        let next_event = NextEvent {
             direction: light.direction,
             pdf,
             light: arriving * light_cos,
             next_event_pdf: light.pdf / pdf_cos,
             light_density: paths * light_cos,
             is_delta: light.is_delta,
-        }
+        };
+        Some((next_event, value))
     }
 }

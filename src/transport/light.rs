@@ -41,11 +41,11 @@ impl LightSampler<'_> {
             store.starts.push(start);
         }
         while flux.is_finite() && flux.max_element() > 0.0 {
-            let mut arrived = arrival(self.world, &end);
+            let sight = end.sight();
+            let mut arrived = arrival(self.world, &end, sight.as_ref());
             let u = sampler.next_3d();
             let goes_on = sampler.next_1d() < arrived.survival;
-            let bsdf = &end.vertex.bsdf;
-            let sample = if goes_on { bsdf.sample_continuous(end.wo, Walk::Light, u) } else { None };
+            let sample = if goes_on { sight.and_then(|s| s.sample(Walk::Light, u)) } else { None };
             arrived.goes_on = sample.is_some();
             store.arrivals.push(arrived);
             if self.estimator == Estimator::Literal {

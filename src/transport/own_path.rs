@@ -25,13 +25,13 @@ impl OwnPath {
     }
 
     /// Light of the arrival's next-event segment, beside the segment that leaves it with probability `survival`.
-    /// `value`: of the BSDF.
-    pub fn see_next_event(&mut self, n: &NextEvent, survival: f32, value: impl FnOnce(Vec3) -> Vec3) {
+    /// `value`: of the BSDF along it.
+    pub fn see_next_event(&mut self, n: &NextEvent, survival: f32, value: Vec3) {
         if n.next_event_pdf <= 0.0 || self.bounces >= self.most {
             return;
         }
         let met = if n.is_delta { 0.0 } else { survival * n.pdf };
-        self.add(value(n.direction) * n.light / (n.next_event_pdf + met));
+        self.add(value * n.light / (n.next_event_pdf + met));
     }
 
     /// Light that the segment which leaves the arrival met. `value`: of the BSDF; `density`: of the segment, its

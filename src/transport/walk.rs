@@ -6,7 +6,7 @@
 //! visibility (cut-outs, transparency) is not among them: it is a factor on the throughput for every technique.
 
 use crate::math::Sampler;
-use crate::shading::bsdf::{Event, Walk};
+use crate::shading::bsdf::{Among, Event, Sight, Walk};
 use crate::shading::{LightPoint, Piece, Shaded, SurfacePoint, Vertex, World};
 use glam::Vec3;
 
@@ -51,6 +51,11 @@ pub struct End {
 }
 
 impl End {
+    /// Its continuous lobes, seen from where the segment came.
+    pub fn sight(&self) -> Option<Sight<'_>> {
+        self.vertex.bsdf.sight(self.wo, Among::Continuous)
+    }
+
     /// Probability that a segment which arrives from `from` ends here.
     pub fn probability_from(&self, world: &World, from: Vec3) -> f32 {
         world.end_probability(&self.hit, &self.vertex.bsdf, from)

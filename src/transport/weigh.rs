@@ -9,7 +9,8 @@ use super::bridge::Bridges;
 use super::cluster::{Cluster, Clusters};
 use super::store::{CameraStore, LightStore, NextEvent};
 use super::{Cut, Estimator};
-use crate::shading::bsdf::Bsdf;
+use crate::math::density::ProjectedPdf;
+use crate::shading::bsdf::{Among, Bsdf};
 use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -319,7 +320,12 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let mut next_event_pdfs = vec![0.0; n];
     let mut next_event_values = vec![Vec3::ZERO; rows * n];
     for (row, (bsdf, wo, q)) in gatherers.iter().enumerate() {
-        let look = |w: Vec3| (q * bsdf.continuous_pdf(*wo, w).0, bsdf.eval(*wo, w));
+        let sight = bsdf.sight(*wo, Among::Continuous);
+        let look = |w: Vec3| {
+            let (value, ProjectedPdf(pdf)) =
+                sight.as_ref().map_or((Vec3::ZERO, ProjectedPdf(0.0)), |s| s.look(w));
+            (q * pdf, value)
+        };
         for (column, (i, _)) in cameras.iter().enumerate() {
             if s.camera.arrivals[*i].goes_on {
                 let (pdf, value) = look(s.camera.outgoing[*i].direction);
@@ -352,7 +358,8 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     }
     for (t, (own, bsdf)) in lights.iter().enumerate() {
         let a = &s.light.arrivals[*own];
-        let pdf = |w: Vec3| a.survival * bsdf.continuous_pdf(a.wo, w).0;
+        let sight = bsdf.sight(a.wo, Among::Continuous);
+        let pdf = |w: Vec3| sight.as_ref().map_or(0.0, |s| a.survival * s.pdf(w).0);
         for (row, (i, _)) in cameras.iter().enumerate() {
             let part = pdf(s.camera.arrivals[*i].wo);
             densities[row].light += part;

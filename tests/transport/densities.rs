@@ -41,7 +41,7 @@ fn on_plate(world: &World, upper: bool, sampler: &mut Sampler) -> (Arrival, End)
         let (z, wo) = if upper { (1.0, Vec3::new(d.x, d.y, -d.z)) } else { (0.0, d) };
         let origin = place.extend(z) + wo * 0.3;
         if let Some(end) = follow(world, ray(origin, -wo), Walk::Camera, &mut Sampler::new(0, 0, 0)).1 {
-            return (arrival(world, &end), end);
+            return (arrival(world, &end, end.sight().as_ref()), end);
         }
     }
 }
@@ -85,7 +85,7 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
         }
         push(&mut camera, a, out);
         if let Some(e) = next {
-            push(&mut camera, arrival(world, &e), Outgoing::default());
+            push(&mut camera, arrival(world, &e, e.sight().as_ref()), Outgoing::default());
         }
         let mut sampler = Sampler::new(seed, 2, k);
         let (mut a, end) = on_plate(world, true, &mut sampler);
@@ -99,7 +99,7 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
         let next = going
             .and_then(|_| follow(world, Piece::leaving(&end.hit, direction), Walk::Light, &mut sampler).1);
         if let Some(e) = next {
-            light.arrivals.push(arrival(world, &e));
+            light.arrivals.push(arrival(world, &e, e.sight().as_ref()));
             let rivals = Rivals::Later { light_choices: 1.0, squeeze: 1.0 };
             light.photons.push(Photon { bounces: 1, rivals, ..photon });
         }

@@ -42,5 +42,5 @@ pub fn follow(world: &World, piece: Piece, walk: Walk, sampler: &mut Sampler) ->
 pub fn arrive(world: &World, origin: Vec3, direction: Vec3) -> Option<Arrival> {
     let mut sampler = Sampler::new(0, 0, 0);
     let end = follow(world, ray(origin, direction), Walk::Light, &mut sampler).1?;
-    Some(arrival(world, &end))
+    Some(arrival(world, &end, end.sight().as_ref()))
 }

@@ -12,15 +12,17 @@
 
 mod builder;
 pub mod principled;
+mod sight;
 mod walk;
 
 pub use builder::{BsdfBuilder, CAPACITY};
 pub use principled::{MetalF90, Principled};
+pub use sight::{Among, Sight};
 pub use walk::{Event, Passage};
 
-use super::lobes::{Density, Kind, Lobe, MIN_COS, Side};
-use crate::math::density::{DiscreteProbability, ProjectedPdf};
-use crate::math::{Frame, ONE_MINUS_EPSILON};
+use super::lobes::{Density, Kind, Lobe, MIN_COS};
+use crate::math::Frame;
+use crate::math::density::ProjectedPdf;
 use glam::Vec3;
 use smallvec::SmallVec;
 
@@ -70,9 +72,6 @@ struct Entry {
 
 /// Cosine to which the direction looked from is raised where the shading normal faces away from it.
 const GRAZING: f32 = 1e-3;
-/// Least share of its weight at which a lobe is chosen, whatever its albedo: keeps every density with
-/// which a lobe may answer the adjoint walk well away from zero.
-const MIN_CHOICE: f32 = 1.0 / 32.0;
 
 impl Entry {
     /// The direction looked from in the local frame, on the geometric side `side` (+1 or -1).
@@ -216,32 +215,12 @@ impl Bsdf {
 
     /// Density with which [`Bsdf::sample`], standing on `from`, draws `to` from the continuous lobes.
     pub fn pdf(&self, from: Vec3, to: Vec3) -> ProjectedPdf {
-        let Some((sf, st, cos)) = self.sides(from, to) else { return ProjectedPdf(0.0) };
-        let choice = Choice::new(self, from, sf);
-        self.pdf_with(&choice, from, sf, to, st, cos)
+        self.sight(from, Among::All).map_or(ProjectedPdf(0.0), |s| s.pdf(to))
     }
 
-    #[inline]
-    fn pdf_with(&self, choice: &Choice, from: Vec3, sf: f32, to: Vec3, st: f32, cos: f32) -> ProjectedPdf {
-        let mut sum = 0.0;
-        for (k, e) in self.entries().iter().enumerate() {
-            if e.delta {
-                continue;
-            }
-            if let (Some(t), Some(f)) = (e.scattered(to, st), e.seen_from(from, sf)) {
-                sum += choice.probability(k) * e.lobe.pdf(f, t).0 * t.z.abs();
-            }
-        }
-        ProjectedPdf(sum / cos)
-    }
-
-    /// Draws a direction, standing on `from`. `u`: three independent uniform numbers of [0,1); x and y
-    /// choose the direction, z the lobe. `None`: the light is absorbed.
+    /// Draws a direction, standing on `from`: [`Sight::sample`] among all lobes.
     pub fn sample(&self, from: Vec3, walk: Walk, u: Vec3) -> Option<BsdfSample> {
-        let sf = self.side_of(from)?;
-        let choice = Choice::new(self, from, sf);
-        let (k, uz) = choice.pick(u.z);
-        self.sample_entry(&choice, k, from, sf, walk, u.with_z(uz))
+        self.sight(from, Among::All)?.sample(walk, u)
     }
 
     /// The geometric side of a direction; `None` where nothing scatters or it is in the tangent plane.
@@ -251,107 +230,10 @@ impl Bsdf {
         (!self.is_black() && cos.abs() >= MIN_COS).then(|| 1f32.copysign(cos))
     }
 
-    /// Draws a direction from lobe `k`, which `choice` chose.
-    #[inline]
-    fn sample_entry(
-        &self,
-        choice: &Choice,
-        k: usize,
-        from: Vec3,
-        sf: f32,
-        walk: Walk,
-        u: Vec3,
-    ) -> Option<BsdfSample> {
-        let e = &self.entries()[k];
-        let local = e.seen_from(from, sf)?;
-        let s = e.lobe.sample(local, u)?;
-        let direction = e.frame.to_world(s.direction).normalize();
-        let cos_to = self.ng.dot(direction);
-        let st = match s.kind.side {
-            Side::Reflection => sf,
-            Side::Transmission => -sf,
-        };
-        if cos_to * st < MIN_COS {
-            return None;
-        }
-        let (value, pdf, eta) = if e.delta {
-            let value = match walk {
-                Walk::Camera => e.weight * s.value,
-                // the delta's coefficient is symmetric in étendue about ns; this is the change to ng
-                Walk::Light => {
-                    let turn = (local.z * cos_to / (self.ng.dot(from) * s.direction.z)).abs();
-                    e.weight * s.value * turn
-                }
-            };
-            (value, s.pdf * DiscreteProbability(choice.probability(k)), s.eta)
-        } else {
-            let value = match walk {
-                Walk::Camera => self.eval(from, direction),
-                Walk::Light => self.eval_flux(from, direction),
-            };
-            let pdf = self.pdf_with(choice, from, sf, direction, st, cos_to.abs());
-            (value, Density::Projected(pdf), self.relative_index(from, direction))
-        };
-        let usable = pdf.value() > 0.0 && pdf.value().is_finite() && value.max_element() > 0.0;
-        usable.then_some(BsdfSample { direction, value, pdf, eta, kind: s.kind })
-    }
-
     /// Estimate of the directional albedo seen along `wo`: for the Albedo pass, for roulette.
     pub fn albedo(&self, wo: Vec3) -> Vec3 {
         let side = 1f32.copysign(self.ng.dot(wo));
         let one = |e: &Entry| e.seen_from(wo, side).map_or(Vec3::ZERO, |o| e.weight * e.lobe.albedo(o));
         self.entries().iter().map(one).sum()
-    }
-}
-
-/// The probabilities of choosing each lobe when standing on some direction.
-struct Choice {
-    len: usize,
-    cumulative: [f32; CAPACITY],
-}
-
-impl Choice {
-    /// Among all lobes.
-    #[inline]
-    fn new(bsdf: &Bsdf, from: Vec3, side: f32) -> Self {
-        Self::among(bsdf, from, side, |_| true)
-    }
-
-    /// Among the lobes that are `wanted`, of which there is one at least.
-    #[inline]
-    fn among(bsdf: &Bsdf, from: Vec3, side: f32, wanted: impl Fn(&Entry) -> bool) -> Self {
-        let mut cumulative = [0.0; CAPACITY];
-        let mut sum = 0.0;
-        let len = bsdf.entries.len();
-        if len == 1 {
-            cumulative[0] = 1.0;
-            return Self { len: 1, cumulative };
-        }
-        for (c, e) in cumulative.iter_mut().zip(bsdf.entries()) {
-            if !wanted(e) {
-                *c = sum;
-                continue;
-            }
-            let albedo = e.seen_from(from, side).map_or(Vec3::ZERO, |o| e.lobe.albedo(o));
-            sum += (e.weight * albedo.max(Vec3::splat(MIN_CHOICE))).element_sum();
-            *c = sum;
-        }
-        for c in &mut cumulative[..len] {
-            *c /= sum;
-        }
-        Self { len, cumulative }
-    }
-
-    #[inline]
-    fn probability(&self, k: usize) -> f32 {
-        self.cumulative[k] - if k > 0 { self.cumulative[k - 1] } else { 0.0 }
-    }
-
-    /// Picks a lobe, and makes of `u` a fresh number of [0,1).
-    #[inline]
-    fn pick(&self, u: f32) -> (usize, f32) {
-        let k = self.cumulative[..self.len - 1].iter().take_while(|&&c| u >= c).count();
-        let low = if k > 0 { self.cumulative[k - 1] } else { 0.0 };
-        (k, ((u - low) / self.probability(k)).clamp(0.0, ONE_MINUS_EPSILON))
     }
 }

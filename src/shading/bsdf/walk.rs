@@ -3,7 +3,7 @@
 //! Which of the two happens at a point that has both is a discrete choice, with the probabilities by which
 //! [`Bsdf::sample`] chooses its lobes. Densities of continuous lobes are here *given* that the segment ended.
 
-use super::{Bsdf, BsdfSample, Choice, Walk};
+use super::{Among, Bsdf, BsdfSample, Walk};
 use crate::math::density::ProjectedPdf;
 use crate::shading::lobes::Lobe;
 use glam::Vec3;
@@ -43,21 +43,7 @@ impl Bsdf {
         if !self.has_delta() {
             return if self.is_black() { Event::Absorbed } else { Event::Ends { probability: 1.0 } };
         }
-        let Some(side) = self.side_of(from) else { return Event::Absorbed };
-        let choice = Choice::new(self, from, side);
-        let (k, uz) = choice.pick(u.z);
-        if !self.entries()[k].delta {
-            return Event::Ends { probability: self.continuous_share(&choice) };
-        }
-        let Some(s) = self.sample_entry(&choice, k, from, side, walk, u.with_z(uz)) else {
-            return Event::Absorbed;
-        };
-        let forward = s.pdf.value();
-        // a lobe's own choice between reflection and refraction is the same from both sides
-        let within = forward / choice.probability(k);
-        let Some(far_side) = self.side_of(s.direction) else { return Event::Absorbed };
-        let reverse = within * Choice::new(self, s.direction, far_side).probability(k);
-        Event::Passes(Passage { direction: s.direction, coefficient: s.value, forward, reverse, eta: s.eta })
+        self.sight(from, Among::All).map_or(Event::Absorbed, |s| s.event(walk, u))
     }
 
     /// Probability that a segment which arrives from `from` ends here.
@@ -65,41 +51,22 @@ impl Bsdf {
         if !self.has_delta() {
             return 1.0;
         }
-        let Some(side) = self.side_of(from) else { return 0.0 };
-        self.continuous_share(&Choice::new(self, from, side))
+        self.sight(from, Among::All).map_or(0.0, |s| s.continuous_share())
     }
 
-    /// Probability that a choice falls on a continuous lobe.
-    fn continuous_share(&self, choice: &Choice) -> f32 {
-        let continuous = self.entries().iter().enumerate().filter(|(_, e)| !e.delta);
-        continuous.map(|(k, _)| choice.probability(k)).sum()
-    }
-
-    /// Density with which [`Bsdf::sample_continuous`], standing on `from`, draws `to`.
+    /// Density with which the continuous lobes, seen from `from`, draw `to`.
     pub fn continuous_pdf(&self, from: Vec3, to: Vec3) -> ProjectedPdf {
-        let (true, Some((sf, st, cos))) = (self.has_smooth(), self.sides(from, to)) else {
-            return ProjectedPdf(0.0);
-        };
-        let choice = Choice::among(self, from, sf, |e| !e.delta);
-        self.pdf_with(&choice, from, sf, to, st, cos)
+        self.sight(from, Among::Continuous).map_or(ProjectedPdf(0.0), |s| s.pdf(to))
     }
 
-    /// Draws a direction from the continuous lobes; as [`Bsdf::sample`].
+    /// Draws a direction from the continuous lobes: [`Sight::sample`].
     pub fn sample_continuous(&self, from: Vec3, walk: Walk, u: Vec3) -> Option<BsdfSample> {
-        if !self.has_smooth() {
-            return None;
-        }
-        let side = self.side_of(from)?;
-        let choice = Choice::among(self, from, side, |e| !e.delta);
-        let (k, uz) = choice.pick(u.z);
-        self.sample_entry(&choice, k, from, side, walk, u.with_z(uz))
+        self.sight(from, Among::Continuous)?.sample(walk, u)
     }
 
     /// Estimate of the directional albedo of the continuous lobes, seen from `from`.
     pub fn continuous_albedo(&self, from: Vec3) -> Vec3 {
-        let side = 1f32.copysign(self.ng.dot(from));
-        let continuous = self.entries().iter().filter(|e| !e.delta);
-        continuous.filter_map(|e| e.seen_from(from, side).map(|o| e.weight * e.lobe.albedo(o))).sum()
+        self.sight(from, Among::Continuous).map_or(Vec3::ZERO, |s| s.continuous_albedo())
     }
 
     /// Where all continuous lobes are Lambert's, about one normal: their reflectance and that normal.

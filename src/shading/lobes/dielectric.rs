@@ -25,7 +25,8 @@ pub struct Dielectric {
 #[derive(Clone, Copy, Debug)]
 enum Split {
     Fresnel {
-        loss: GlassLoss,
+        /// Of a rough interface.
+        loss: Option<GlassLoss>,
         /// Reflectance at normal incidence; the exact curve is stretched to begin here.
         f0: Vec3,
         reflection: Vec3,
@@ -56,6 +57,12 @@ impl Facet {
     }
 }
 
+/// The microfacets of an interface: isotropic, and none where they would not blur what is seen through them.
+fn finish(ggx: Ggx, eta: f32) -> Ggx {
+    let smooth = ggx.isotropic().alphas().max_element() * (eta - 1.0).abs() < SMOOTH_BLUR;
+    if smooth { Ggx::new(0.0, 0.0) } else { ggx.isotropic() }
+}
+
 impl Dielectric {
     /// Clear glass of index `eta` (below over above). Lossless.
     pub fn new(ggx: Ggx, eta: f32) -> Self {
@@ -65,20 +72,15 @@ impl Dielectric {
     /// With its own reflectance at normal incidence, and with factors on what is reflected and what is
     /// transmitted.
     pub fn tinted(ggx: Ggx, eta: f32, f0: Vec3, reflection: Vec3, transmission: Vec3) -> Self {
-        let ggx = ggx.isotropic();
-        let loss = GlassLoss::new(&ggx, eta);
-        Self::with_split(ggx, eta, Split::Fresnel { loss, f0, reflection, transmission })
+        let ggx = finish(ggx, eta);
+        let loss = (!ggx.is_smooth()).then(|| GlassLoss::new(&ggx, eta));
+        Self { ggx, eta, split: Split::Fresnel { loss, f0, reflection, transmission } }
     }
 
     /// Refraction without Fresnel reflection; light that would be totally reflected is absorbed, and
     /// what a rough surface scatters more than once is lost.
     pub fn refraction_only(ggx: Ggx, eta: f32) -> Self {
-        Self::with_split(ggx.isotropic(), eta, Split::RefractionOnly)
-    }
-
-    fn with_split(ggx: Ggx, eta: f32, split: Split) -> Self {
-        let smooth = ggx.alphas().max_element() * (eta - 1.0).abs() < SMOOTH_BLUR;
-        Self { ggx: if smooth { Ggx::new(0.0, 0.0) } else { ggx }, eta, split }
+        Self { ggx: finish(ggx, eta), eta, split: Split::RefractionOnly }
     }
 
     /// Index below over index above.
@@ -100,6 +102,11 @@ impl Dielectric {
     #[inline]
     pub(super) fn pdf(&self, from: Vec3, to: Vec3) -> f32 {
         self.terms(from, to).1
+    }
+
+    #[inline]
+    pub(super) fn eval_and_pdf(&self, from: Vec3, to: Vec3) -> (Vec3, f32) {
+        self.terms(from, to)
     }
 
     #[inline]
@@ -139,7 +146,7 @@ impl Dielectric {
     #[inline]
     fn draw(&self, o: Vec3, sign: f32, u: Vec3) -> Option<Vec3> {
         let mut uz = u.z;
-        if let Split::Fresnel { loss, .. } = &self.split {
+        if let Split::Fresnel { loss: Some(loss), .. } = &self.split {
             let dense = self.is_dense(sign);
             let lost = loss.at(o, self.ggx.stretched(o), dense);
             if uz < lost {
@@ -219,7 +226,7 @@ impl Dielectric {
             false => self.reflected((o, so), (i, si), sign),
             true => self.refracted((o, so), (i, si), sign),
         };
-        let Split::Fresnel { loss, reflection, transmission, .. } = &self.split else {
+        let Split::Fresnel { loss: Some(loss), reflection, transmission, .. } = &self.split else {
             return (value, pdf);
         };
         let (dense_o, dense_i) = (self.is_dense(sign), self.is_dense(sign) != crosses);

@@ -1,6 +1,7 @@
 //! Fresnel terms: how much an interface reflects, by the cosine to its normal.
 
 use glam::Vec3;
+use std::sync::LazyLock;
 
 /// Reflectance at normal incidence of an interface of relative refractive index `eta`.
 #[inline]
@@ -33,14 +34,30 @@ pub fn reflectance(c: f32, t: f32, eta: f32) -> f32 {
     0.5 * (s * s + p * p)
 }
 
-/// Average over the hemisphere, `2 integral F(mu) mu dmu`, of the dielectric reflectance for
-/// `eta >= 1`: closed form (Walsh 1926; see d'Eon 2021, "An analytic BRDF for materials with spherical
-/// Lambertian scatterers", eq. 33).
+/// Average over the hemisphere, `2 integral F(mu) mu dmu`, of the dielectric reflectance for `eta >= 1`. Every shaded
+/// surface asks for it, so it is read from a table, to some 1e-6.
 pub fn dielectric_average(eta: f32) -> f32 {
-    let n = f64::from(eta.max(1.0));
+    const NODES: usize = 2048;
+    // divided by z = (eta - 1) / (eta + 1), by which the nodes are evenly spaced; the last one is that of infinity
+    static TABLE: LazyLock<[f32; NODES + 1]> = LazyLock::new(|| {
+        std::array::from_fn(|i| match i as f64 / NODES as f64 {
+            0.0 => 2.0 / 3.0,
+            1.0 => 1.0,
+            z => (average_in_closed_form((1.0 + z) / (1.0 - z)) / z) as f32,
+        })
+    });
+    let z = if eta < 1e6 { ((eta - 1.0) / (eta + 1.0)).max(0.0) } else { 1.0 };
+    let place = z * NODES as f32;
+    let below = (place as usize).min(NODES - 1);
+    let [a, b] = [TABLE[below], TABLE[below + 1]];
+    z * (a + (b - a) * (place - below as f32))
+}
+
+/// Walsh 1926; see d'Eon 2021, "An analytic BRDF for materials with spherical Lambertian scatterers", eq. 33.
+fn average_in_closed_form(n: f64) -> f64 {
     if n < 1.0001 {
         // the closed form cancels; this is its first order, to which only grazing light contributes
-        return ((n - 1.0) / 3.0) as f32;
+        return (n - 1.0) / 3.0;
     }
     let n2 = n * n;
     let p = n2 + 1.0;
@@ -49,7 +66,7 @@ pub fn dielectric_average(eta: f32) -> f32 {
     let b = n2 * m * m / p.powi(3) * ((n - 1.0) / (n + 1.0)).ln();
     let c = -2.0 * n2 * n * (n2 + 2.0 * n - 1.0) / (p * (n2 * n2 - 1.0));
     let d = 8.0 * n2 * n2 * (n2 * n2 + 1.0) / (p * (n2 * n2 - 1.0).powi(2)) * n.ln();
-    (a + b + c + d) as f32
+    a + b + c + d
 }
 
 /// A coloured Fresnel term of a reflecting surface.
@@ -135,6 +152,16 @@ mod tests {
     fn average(f: impl Fn(f64) -> f64) -> f64 {
         let n = 20_000;
         (0..n).map(|i| (i as f64 + 0.5) / n as f64).map(|mu| 2.0 * mu * f(mu)).sum::<f64>() / n as f64
+    }
+
+    #[test]
+    fn the_average_is_read_as_it_is_computed() {
+        for k in 0..=14_000 {
+            let eta = 1.0 + (k as f32 / 1000.0).exp_m1() * 1e-3;
+            let expected = average_in_closed_form(f64::from(eta)) as f32;
+            approx::assert_abs_diff_eq!(dielectric_average(eta), expected, epsilon = 5e-6);
+        }
+        assert_eq!(dielectric_average(f32::INFINITY), 1.0);
     }
 
     #[test]

@@ -185,6 +185,17 @@ impl Lobe {
         ProjectedPdf(each!(self, lobe => lobe.pdf(from, to)))
     }
 
+    /// [`Lobe::eval`] for the camera's side `from`, and [`Lobe::pdf`], which have much in common.
+    #[inline]
+    pub fn eval_and_pdf(&self, from: Vec3, to: Vec3) -> (Vec3, ProjectedPdf) {
+        let (value, pdf) = match self {
+            Self::Reflection(lobe) => lobe.eval_and_pdf(from, to),
+            Self::Dielectric(lobe) => lobe.eval_and_pdf(from, to),
+            _ => (self.eval(from, to), self.pdf(from, to).0),
+        };
+        (value, ProjectedPdf(pdf))
+    }
+
     /// Draws a direction, the other one being `from`. `u`: three independent uniform numbers of [0,1);
     /// x and y choose the direction, z between reflection and refraction.
     #[inline]

@@ -45,6 +45,15 @@ impl Reflection {
         }
     }
 
+    /// Both at once: they share the normal.
+    #[inline]
+    pub(super) fn eval_and_pdf(&self, from: Vec3, to: Vec3) -> (Vec3, f32) {
+        match self.normal(from, to) {
+            Some((o, i, m)) => (self.value(o, i, m), self.ggx.reflection_pdf(o, m) / i.z),
+            None => (Vec3::ZERO, 0.0),
+        }
+    }
+
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: Vec3) -> Option<LobeSample> {
         let flip = from.z < 0.0;

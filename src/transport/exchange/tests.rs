@@ -30,7 +30,7 @@ fn both_ways(world: &World, count: u32) -> (CameraStore, LightStore) {
         let Some(end) = follow.segment(Piece::from_camera(&ray), &mut sampler, &mut Nobody, &mut 0).1 else {
             continue;
         };
-        let mut a = arrival(world, &end);
+        let mut a = arrival(world, &end, end.sight().as_ref());
         let Some(sample) = end.vertex.bsdf.sample_continuous(end.wo, Walk::Camera, sampler.next_3d()) else {
             continue;
         };
@@ -38,7 +38,7 @@ fn both_ways(world: &World, count: u32) -> (CameraStore, LightStore) {
         let piece = Piece::leaving(&end.hit, sample.direction);
         let (chain, next) = follow.segment(piece, &mut sampler, &mut Nobody, &mut 0);
         let Some(next) = next else { continue };
-        let b = arrival(world, &next);
+        let b = arrival(world, &next, next.sight().as_ref());
         let squeeze = 1.0 / (chain.index * chain.index);
         let out = Outgoing {
             direction: sample.direction,

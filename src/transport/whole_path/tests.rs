@@ -44,7 +44,7 @@ fn path(world: &World, number: u32) -> Option<Vec<Point>> {
             before.photon.rivals = Rivals::Later { light_choices: chain.reverse, squeeze: 1.0 / squeeze };
             before.photon.camera_choices = chain.forward;
         }
-        let mut camera = arrival(world, &end);
+        let mut camera = arrival(world, &end, end.sight().as_ref());
         if k < EARLY {
             camera.survival = early_survival(camera.survival);
         }
@@ -56,7 +56,7 @@ fn path(world: &World, number: u32) -> Option<Vec<Point>> {
         };
         let back = vertex.bsdf.continuous_pdf(to_light, end.wo).0;
         let light = End { hit: end.hit, vertex, wo: to_light, opacity, end_probability: 1.0 };
-        let light = Arrival { goes_on: true, ..arrival(world, &light) };
+        let light = Arrival { goes_on: true, ..arrival(world, &light, light.sight().as_ref()) };
         piece = Piece::leaving(&end.hit, to_light);
         points.push(Point {
             camera,
