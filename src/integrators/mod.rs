@@ -3,6 +3,7 @@
 
 pub mod path;
 pub mod segment;
+mod shown;
 pub mod vertices;
 
 use crate::film::{Film, Filter, Rect, Sample};

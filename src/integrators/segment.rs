@@ -1,14 +1,15 @@
 //! Segment-based light transport: the whole method, iteration by iteration.
 
+use super::shown::Shown;
 use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::{Pass, Rect, Sample, SplatBuffer};
 use crate::math::sampler::hash;
-use crate::math::{LUMINANCE, Sampler, luminance};
+use crate::math::{LUMINANCE, Sampler};
 use crate::shading::World;
 use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
-use crate::transport::economy::Economy;
+use crate::transport::economy::{Departure, Economy};
 use crate::transport::grid::Grid;
 use crate::transport::guiding::{Guiding, Outcome, Start};
 use crate::transport::light::LightSampler;
@@ -20,8 +21,6 @@ use glam::Vec3;
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Of the picture's mean brightness, what is added to that of a pixel where shares of it are judged.
-const DARK: f32 = 0.1;
 /// What the segments of a camera path take until they are in the film, about, bytes.
 const BYTES_PER_PIXEL: u64 = 2048;
 /// Most light paths for each pixel of a band, so that theirs stay within bounds, too.
@@ -94,7 +93,7 @@ struct Lessons {
     /// Whether light paths learn from it where to begin.
     guides: bool,
     /// Whether it tells how many of them pay.
-    judges: bool,
+    looks: bool,
     /// Its light paths, and the bands that share them.
     light_paths: f32,
     bands: usize,
@@ -117,19 +116,25 @@ impl Segment {
         let lessons = Lessons {
             guides: self.techniques.emission_guiding
                 && self.guiding.begin_iteration(self.samples.light.starts.len()),
-            judges: self.is_thrifty(context) && Economy::looks(index),
+            looks: self.is_thrifty(context) && Economy::looks(index),
             light_paths,
             bands: bands.len(),
         };
+        let compares = self.is_thrifty(context) && self.economy.compares(index);
+        let mut deviation = 0.0;
         for band in bands {
             let crop = Rect { x: context.crop.x + band.x, y: context.crop.y + band.y, ..band };
             let of_band = Context { crop, ..*context };
             if !self.transport(&of_band, index, light_paths, cut, costs) {
                 return false;
             }
+            let before = if compares { Shown::of(context.film, band) } else { None };
             self.gather(&of_band, band);
             costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-            if lessons.guides || lessons.judges {
+            if let Some((before, after)) = before.zip(Shown::of(context.film, band)) {
+                deviation += f64::from(context.completed + 1) * before.deviation(&after);
+            }
+            if lessons.guides || lessons.looks {
                 let bytes = self.learn(&of_band, band, &lessons, cut);
                 costs.stage("learning", bytes);
             }
@@ -138,7 +143,8 @@ impl Segment {
             self.guiding.finish_iteration(context.world, cut);
             costs.stage("learning", self.guiding.bytes());
         }
-        if lessons.judges {
+        if compares {
+            self.economy.judge(index, Departure { deviation, before: context.completed });
             let left_out = self.economy.left_out(context.world.has_hidden_light());
             *context.counters.left_out.lock().unwrap_or_else(PoisonError::into_inner) = left_out;
         }
@@ -332,13 +338,9 @@ impl Segment {
     /// Learns from a band where light paths should begin and how many of them pay, by what they bring as a share of what
     /// is shown. Returns the bytes that it took.
     fn learn(&mut self, context: &Context, band: Rect, lessons: &Lessons, cut: &Cut) -> usize {
-        let Ok(shown) = context.film.read_pass(Pass::Combined, band) else { return 0 };
-        let shown: Vec<f32> =
-            shown.chunks_exact(4).map(|c| luminance(Vec3::new(c[0], c[1], c[2])).max(0.0)).collect();
-        let mean = shown.iter().map(|&l| f64::from(l)).sum::<f64>() / shown.len() as f64;
-        let floor = DARK * mean as f32;
-        let starts = self.primaries.iter().zip(&shown).filter_map(|(p, l)| {
-            let worth = p.weight * (LUMINANCE / (l + floor));
+        let Some(shown) = Shown::of(context.film, band) else { return 0 };
+        let starts = self.primaries.iter().zip(shown.scales()).filter_map(|(p, scale)| {
+            let worth = p.weight * (LUMINANCE / scale);
             let worth = if worth.is_finite() { worth } else { Vec3::ZERO };
             Some(Start { arrival: p.arrival?, passages: p.passages, worth })
         });
@@ -346,8 +348,8 @@ impl Segment {
         let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
         let (weights, reflected, max_depth) = (&self.weights, &self.reflected, context.max_depth);
         let outcome = Outcome { sampled, weights, reflected, starts: &starts, max_depth };
-        if lessons.judges {
-            self.economy.judge(outcome, lessons.light_paths, lessons.bands, cut);
+        if lessons.looks {
+            self.economy.look(outcome, lessons.light_paths, lessons.bands, cut);
         }
         if lessons.guides { self.guiding.learn(outcome, cut) } else { 0 }
     }

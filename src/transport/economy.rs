@@ -7,6 +7,9 @@
 //! paths find best speaks for itself through them. What it is worth is judged by the brightness of its pixel, at deeper
 //! arrivals along their own camera path. Looking is done by iterations that have all their light paths, and decides for
 //! later ones: that biases nothing.
+//!
+//! What fewer light paths lose at deeper arrivals is told too low, in some scenes by a factor of three, in others not at
+//! all. Where that decides, one iteration with fewer is a trial, and the pictures tell ([`Trial`]).
 
 use super::Cut;
 use super::cluster::Cluster;
@@ -21,13 +24,17 @@ use rayon::prelude::*;
 
 /// Numbers of light paths that are compared, as shares of all.
 const SHARES: [f32; 4] = [0.0, 1.0 / 16.0, 0.25, 1.0];
+/// Number of the last.
+const ALL: usize = SHARES.len() - 1;
 /// Cost of a point at which an area is probed, in arrivals.
 const PROBE: f64 = 0.25;
 /// Growth of their number with that of light paths: fewer photons are in nearly as many clusters.
 const PROBE_GROWTH: f64 = 0.2;
-/// Factor on the variance that fewer light paths add: what deeper arrivals lose is told so much too low (measured,
+/// Factor on the variance that fewer light paths add: what deeper arrivals lose is told up to so much too low (measured,
 /// `benches/NOTES.md`).
 const UNTOLD: f64 = 3.0;
+/// The same where it is told in full.
+const TOLD: f64 = 1.0;
 /// Gain that is worth the risk of leaving light paths out: what they have not found so far is not known.
 const WORTHWHILE: f64 = 1.1;
 /// So many light paths at least, if any: those of a cluster would else be parts of one path, and what is estimated by
@@ -44,14 +51,36 @@ type PerShare = [f64; SHARES.len()];
 pub struct Economy {
     /// For every share, the sum of what pixels are off, as far as it has been looked at.
     errors: PerShare,
+    /// For every share, arrivals sampled and what else costs as much, of the last iteration that looked.
+    costs: PerShare,
     /// Share of the light paths that pays.
     share: f32,
+    /// A smaller one that may, which the next iteration tries.
+    trial: Option<Trial>,
 }
 
 impl Default for Economy {
     fn default() -> Self {
-        Self { errors: [0.0; SHARES.len()], share: 1.0 }
+        Self { errors: [0.0; SHARES.len()], costs: [0.0; SHARES.len()], share: 1.0, trial: None }
     }
+}
+
+/// A share of the light paths on trial, after an iteration with all of them.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    /// Which of [`SHARES`].
+    share: usize,
+    /// Variance of a picture with all light paths.
+    with_all: f64,
+}
+
+/// How far the picture of an iteration is from the mean of those before.
+#[derive(Clone, Copy, Debug)]
+pub struct Departure {
+    /// Standard deviation by pixel brightness, in units that are the same from iteration to iteration.
+    pub deviation: f64,
+    /// Iterations before.
+    pub before: u32,
 }
 
 /// What some technique may bring to a cluster.
@@ -77,12 +106,17 @@ impl Economy {
         (index + 1).is_power_of_two() && (index + 1).trailing_zeros().is_multiple_of(2)
     }
 
+    /// Whether iteration `index` has to be compared to those before.
+    pub fn compares(&self, index: u32) -> bool {
+        Self::looks(index) || self.trial.is_some()
+    }
+
     /// How many of `all` light paths iteration `index` should sample. `some`: whether some must be, since there may be
     /// light that camera paths cannot find.
     pub fn light_paths(&self, all: f32, index: u32, some: bool) -> f32 {
         match Self::looks(index) {
             true => all,
-            false => match self.usual(some) {
+            false => match self.next(some) {
                 0.0 => 0.0,
                 share => (share * all).ceil().max(FEWEST).min(all),
             },
@@ -94,6 +128,12 @@ impl Economy {
         if some { self.share.max(SHARES[1]) } else { self.share }
     }
 
+    /// Share of the light paths in the next iteration, if it does not look.
+    fn next(&self, some: bool) -> f32 {
+        let tried = self.trial.map(|t| Self { share: SHARES[t.share], ..Self::default() });
+        tried.as_ref().unwrap_or(self).usual(some)
+    }
+
     /// What is left out, for the log and the statistics.
     pub fn left_out(&self, some: bool) -> Option<String> {
         let share = self.usual(some);
@@ -102,9 +142,9 @@ impl Economy {
         (share < 1.0).then(|| format!("light paths, {percent:.0} % of them in most iterations: {why}"))
     }
 
-    /// Judges by an iteration that sampled all light paths, which were so many, or by one of its bands, which share their
+    /// Looks at an iteration that sampled all light paths, which were so many, or at one of its bands, which share their
     /// cost.
-    pub fn judge(&mut self, o: Outcome, light_paths: f32, bands: usize, cut: &Cut) {
+    pub fn look(&mut self, o: Outcome, light_paths: f32, bands: usize, cut: &Cut) {
         let found = errors(o, cut);
         if cut.is_raised() || found.iter().any(|v| v.is_nan()) {
             return;
@@ -115,16 +155,39 @@ impl Economy {
         let camera = (s.camera.arrivals.len() + starts.len()) as f64;
         let light = (s.light.arrivals.len() as f64 + f64::from(light_paths)) / bands as f64;
         let probes = PROBE * s.clusters.probes as f64;
-        let cost = |r: f64| camera + r * light + r.powf(PROBE_GROWTH) * probes;
-        let all = SHARES.len() - 1;
+        self.costs = SHARES.map(f64::from).map(|r| camera + r * light + r.powf(PROBE_GROWTH) * probes);
+    }
+
+    /// Judges after iteration `index`, by what was seen in it.
+    pub fn judge(&mut self, index: u32, departure: Departure) {
+        let Departure { deviation, before } = departure;
+        // the mean of those before varies as well, at 1 / before of what they do
+        let (squared, before) = (deviation * deviation, f64::from(before));
+        if Self::looks(index) {
+            let [surely, perhaps] = [UNTOLD, TOLD].map(|factor| self.best(factor));
+            self.share = SHARES[surely];
+            let is_open = surely != perhaps && surely == ALL && before > 0.0;
+            self.trial =
+                is_open.then_some(Trial { share: perhaps, with_all: squared * before / (before + 1.0) });
+        } else if let Some(Trial { share, with_all }) = self.trial.take() {
+            let with_fewer = squared - with_all / before;
+            if WORTHWHILE * with_fewer * self.costs[share] < with_all * self.costs[ALL] {
+                self.share = SHARES[share];
+            }
+        }
+    }
+
+    /// The share at which error times cost is least, if what fewer light paths add to the variance is `factor` times
+    /// what is told.
+    fn best(&self, factor: f64) -> usize {
         let told = |k: usize| self.errors[k] * self.errors[k];
         let variance = |k: usize| {
-            let added = told(k) - told(all);
-            told(all) + if added > 0.0 { UNTOLD * added } else { added }
+            let added = told(k) - told(ALL);
+            told(ALL) + if added > 0.0 { factor * added } else { added }
         };
-        let product = |k: usize| variance(k) * cost(f64::from(SHARES[k]));
-        let best = (0..all).min_by(|&a, &b| product(a).total_cmp(&product(b))).unwrap_or(all);
-        self.share = if WORTHWHILE * product(best) < product(all) { SHARES[best] } else { 1.0 };
+        let product = |k: usize| variance(k) * self.costs[k];
+        let best = (0..ALL).min_by(|&a, &b| product(a).total_cmp(&product(b))).unwrap_or(ALL);
+        if WORTHWHILE * product(best) < product(ALL) { best } else { ALL }
     }
 }
 
@@ -292,79 +355,4 @@ fn of_row(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::sampler::hash_unit;
-
-    /// Camera draws, and light draws of a share of their full number, of an integral over [0,1].
-    struct Drawn {
-        camera: Vec<[(f64, f64); 3]>,
-        photons: Vec<(f64, f64)>,
-    }
-
-    impl Drawn {
-        fn sum(&self) -> f64 {
-            self.camera.iter().flatten().chain(&self.photons).map(|&(c, _)| c).sum()
-        }
-    }
-
-    /// Camera draws are uniform; light draws fall into the last tenth, where the integrand is large.
-    fn draw(share: f64, seed: u32) -> Drawn {
-        const CAMERA: u32 = 12;
-        const LIGHT: u32 = 40;
-        let g = |x: f64| if x > 0.9 { 6.0 * (1.0 + x) } else { 0.2 * x };
-        let by_light = |x: f64| if x > 0.9 { share * f64::from(LIGHT) * 10.0 } else { 0.0 };
-        let item = |x: f64| {
-            let density = f64::from(CAMERA) + by_light(x);
-            (g(x) / density, by_light(x) / density)
-        };
-        let unit = |k: u32| f64::from(hash_unit(seed, k));
-        let camera = (0..CAMERA).map(|k| [item(unit(k)), (0.0, 0.0), (0.0, 0.0)]).collect();
-        // so many on average, independent of each other
-        let tries = LIGHT * 16;
-        let falls = (0..tries).filter(|k| unit(1000 + 2 * k) < share / 16.0);
-        let photons = falls.map(|k| item(0.9 + 0.1 * unit(1001 + 2 * k))).collect();
-        Drawn { camera, photons }
-    }
-
-    #[test]
-    fn what_fewer_light_paths_would_bring_is_told_by_all_of_them() {
-        let runs = 20_000;
-        let mut told = [0.0; SHARES.len()];
-        for seed in 0..runs {
-            let d = draw(1.0, seed);
-            let found = of_row(d.camera.into_iter(), d.photons.into_iter());
-            told.iter_mut().zip(found).for_each(|(sum, v)| *sum += v / f64::from(runs));
-        }
-        for (k, share) in SHARES.into_iter().enumerate() {
-            let sums: Vec<f64> = (0..runs).map(|seed| draw(f64::from(share), runs + seed).sum()).collect();
-            let mean = sums.iter().sum::<f64>() / f64::from(runs);
-            let variance = sums.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / f64::from(runs - 1);
-            println!("share {share}: told {:.5}, found {variance:.5}, mean {mean:.4}", told[k]);
-            // draws of the camera are so many, not so many on average, which makes them a little better
-            assert!((0.95..1.2).contains(&(told[k] / variance)), "{share}: {} {variance}", told[k]);
-        }
-    }
-
-    #[test]
-    fn what_only_light_paths_find_keeps_them() {
-        let camera = || [[(1.0, 0.0), (0.0, 0.0), (0.0, 0.0)]; 4].into_iter();
-        let found = of_row(camera(), [(1e-3, 1.0)].into_iter());
-        assert!(found[0].is_infinite() && found[1..].iter().all(|v| v.is_finite()), "{found:?}");
-        // and where none of it was found, the rest decides alone
-        assert_eq!(of_row(camera(), [(0.0, 1.0)].into_iter()), [0.0; SHARES.len()]);
-    }
-
-    #[test]
-    fn all_are_sampled_at_first_and_now_and_then() {
-        let none = Economy { share: 0.0, ..Economy::default() };
-        for k in 0..17 {
-            let all = if [0, 3, 15].contains(&k) { 5000.0 } else { 0.0 };
-            assert_eq!(none.light_paths(5000.0, k, false), all, "{k}");
-        }
-        assert_eq!(none.light_paths(5000.0, 1, true), 313.0);
-        assert_eq!(none.light_paths(500.0, 1, true), FEWEST);
-        assert_eq!(none.light_paths(5.0, 1, true), 5.0);
-        assert_eq!(Economy::default().light_paths(5.0, 1, false), 5.0);
-    }
-}
+mod tests;

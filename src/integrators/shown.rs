@@ -1,0 +1,38 @@
+//! The picture so far, as that by which an iteration is judged.
+
+use crate::film::{Film, Pass, Rect};
+use crate::math::luminance;
+use glam::Vec3;
+
+/// Of the picture's mean brightness, what is added to that of a pixel where shares of it are judged.
+const DARK: f32 = 0.1;
+/// Pixels whose deviations are judged together.
+const ROW: usize = 64;
+
+/// Luminance of a band as it stands in the film.
+pub struct Shown(Vec<f32>);
+
+impl Shown {
+    /// Of a band.
+    pub fn of(film: &Film, band: Rect) -> Option<Self> {
+        let shown = film.read_pass(Pass::Combined, band).ok()?;
+        let luminances = shown.chunks_exact(4).map(|c| luminance(Vec3::new(c[0], c[1], c[2])).max(0.0));
+        Some(Self(luminances.collect()))
+    }
+
+    /// By which the brightness of each pixel is judged.
+    pub fn scales(&self) -> impl Iterator<Item = f32> {
+        let mean = self.0.iter().map(|&l| f64::from(l)).sum::<f64>() / self.0.len() as f64;
+        let floor = DARK * mean as f32;
+        self.0.iter().map(move |l| l + floor)
+    }
+
+    /// How far another state is from this one: relative deviations, squared over short rows of pixels and summed over
+    /// these, so that a few bright specks do not decide.
+    pub fn deviation(&self, other: &Self) -> f64 {
+        let pixels = self.0.iter().zip(&other.0).zip(self.scales());
+        let squares: Vec<f64> = pixels.map(|((a, b), scale)| f64::from((b - a) / scale).powi(2)).collect();
+        let finite = |square: &&f64| square.is_finite();
+        squares.chunks(ROW).map(|row| row.iter().filter(finite).sum::<f64>().sqrt()).sum()
+    }
+}
