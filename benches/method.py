@@ -1,9 +1,9 @@
 """The figures of docs/method.md: gain over path tracing at equal processor time, and the mean against the kernel's size.
 
 Needs the scenes and references that are shared between renderers (SEGUE_SHARED, or ../shared beside the
-checkout); without them it says so and does nothing. `gallery` needs none of it, nor does `pictures`, but what
+checkout); without them it says so and does nothing. `gallery` needs them for two of its scenes, `pictures` needs what
 `cargo test --release --test method_pictures -- --ignored` draws. Run:
-.venv/bin/python benches/method.py table|consistency|gallery [SCENE ...]|plot|pictures
+.venv/bin/python benches/method.py table [SCENE ...]|consistency|gallery [SCENE ...]|plot|pictures
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from segue import Render, images, metrics, usd
+from segue import Render, images, usd
+from two_references import SHARP, relative_error
 
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers"
 SCENES = ("cornell", "cornell_glass", "ajar_door", "glossy_box", "lamp", "furnace")
-#: Scenes of the gallery, an unbiased method (or one whose bias is least) that finds their light, samples a pixel, and
+#: Scenes of the gallery and two of the shared ones, an unbiased method (or one whose bias is least) that finds their light, samples a pixel, and
 #: light paths for each camera path: many where a sun's photons are few in pixels of so small a picture.
 GALLERY = {
     "door_ajar": ("bdpt", 96, 1),
@@ -30,6 +31,8 @@ GALLERY = {
     "night_market": ("path", 96, 1),
     "pool": ("vcm", 96, 8),
     "still_life": ("path", 96, 1),
+    "usd/cornell_glass": ("vcm", 192, 2),
+    "usd/lamp": ("vcm", 192, 1),
 }
 PICTURES = ROOT / "docs" / "pictures"
 #: Relative noise of the references' means, as far as other renderers tell.
@@ -58,27 +61,19 @@ def load(name: str) -> tuple[Any, np.ndarray]:
 
 def table() -> None:
     """Markdown rows."""
-    for name in SCENES:
-        scene, reference = load(name)
-        found = {}
+    for name in sys.argv[2:] or SCENES:
+        scene, first = load(name)
+        common = {"resolution": [256, 256], "threads": 2}
+        second, _ = render(scene, time=2.0 * SECONDS, **common, **SHARP)
+        cells, costs = [], []
         for method in ("path", "segment"):
-            picture, stats = render(
-                scene, integrator=method, resolution=[256, 256], time=SECONDS, threads=2
-            )
-            error = metrics.errors(picture, reference)["relmse"]
-            found[method] = (
-                stats["samples"],
-                stats["cpu_seconds"],
-                error,
-                picture.mean(),
-            )
-        (n, cpu, error, _), (ns, cpu_s, error_s, mean) = found["path"], found["segment"]
-        gain = error * cpu / (error_s * cpu_s)
-        off = mean / reference.mean() - 1.0
-        print(
-            f"| {name} | {n:.0f} | {error:.4f} | {ns:.0f} | {error_s:.4f} | {gain:.1f} | {off:+.2%} |",
-            flush=True,
-        )
+            picture, stats = render(scene, integrator=method, time=SECONDS, **common)
+            error = relative_error(*(p.astype(float) for p in (picture, first, second)))
+            cells += [f"{stats['samples']:.0f}", f"{error:.3g}"]
+            costs.append(error * stats["cpu_seconds"])
+        off = picture.mean(dtype=float) / first.mean(dtype=float) - 1.0
+        cells += [f"{costs[0] / costs[1]:.1f}", f"{off:+.2%}"]
+        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
 
 
 def consistency(seeds: int = 4, samples: int = 12) -> None:
@@ -116,14 +111,18 @@ def means(scene: Any, seeds: int, **settings: Any) -> np.ndarray:
 
 
 def gallery(seeds: int = 6) -> None:
-    """Means of the gallery's scenes by size of a fixed kernel, beside an unbiased method, as JSON lines.
+    """Means of scenes by size of a fixed kernel, beside an unbiased method, as JSON lines.
 
     All methods take the same camera samples for a seed, so what camera rays see straight or through glass (glints of
     the sun, mostly) has no part in the differences, whose standard errors are printed.
     """
     for name in sys.argv[2:] or GALLERY:
         unbiased, samples, light_paths = GALLERY[name]
-        scene = usd.load(ROOT / "scenes" / f"{name}.usda").scene
+        folder = SHARED if name.startswith("usd/") else ROOT / "scenes"
+        if not (folder / f"{name}.usda").exists():
+            print(f"skipped: {folder / name}.usda does not exist", file=sys.stderr)
+            continue
+        scene = usd.load(folder / f"{name}.usda").scene
         kernels = {f"segment {s:g} px": {"kernel_size": s} for s in SIZES}
         # the disks of `vcm` lose light at edges: small ones
         small = {"integrator": unbiased, "kernel_size": 0.5}

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from segue import Render, images, usd
+from two_references import SHARP, relative_error
 
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers"
@@ -50,23 +51,6 @@ squared mean of both over 5 × 5 pixels. What was measured at a slightly other t
 | scene | {heads} | best of the others | its error over `segment`'s |
 |---|{lines}---|---|
 """
-
-
-def smooth(picture: np.ndarray, radius: int = 2) -> np.ndarray:
-    """Means over squares of pixels."""
-    width = 2 * radius + 1
-    padded = np.pad(picture, ((radius, radius), (radius, radius), (0, 0)), mode="edge")
-    squares = np.lib.stride_tricks.sliding_window_view(
-        padded, (width, width), axis=(0, 1)
-    )
-    return squares.mean(axis=(-2, -1))
-
-
-def relative_error(picture: np.ndarray, first: np.ndarray, second: np.ndarray) -> float:
-    """Relative mean squared error that neither reference's noise is part of."""
-    mean = (first + second) / 2
-    scale = smooth(mean) ** 2 + (0.01 * mean.mean()) ** 2
-    return float(((picture - first) * (picture - second) / scale).mean())
 
 
 def ours(scene: Any, **settings: Any) -> tuple[np.ndarray, float]:
@@ -110,8 +94,7 @@ def row(harness: Path, name: str) -> str:
     """The table's row of a scene."""
     scene = usd.load(SHARED / "usd" / f"{name}.usda").scene
     first = images.read_rgb(SHARED / "refs" / f"{name}.exr").astype(np.float64)
-    sharp = {"kernel": "fixed", "kernel_size": 0.35, "seed": 2**30}
-    second, _ = ours(scene, time=REFERENCE_SECONDS, **sharp)
+    second, _ = ours(scene, time=REFERENCE_SECONDS, **SHARP)
     found = {m: ours(scene, integrator=m, time=SECONDS) for m in OURS}
     found |= theirs(harness, name)
     errors = {
