@@ -106,7 +106,7 @@ impl Segment {
         let bands = self.bands(context);
         let all = self.most_light_paths(context);
         let light_paths = match self.is_thrifty(context) {
-            true => self.economy.light_paths(all, index, context.world.has_hidden_light()),
+            true => self.economy.light_paths(all, index),
             false => all,
         };
         if !self.sample_light(context, index, light_paths as u32, cut) {
@@ -144,8 +144,9 @@ impl Segment {
             costs.stage("learning", self.guiding.bytes());
         }
         if compares {
-            self.economy.judge(index, Departure { deviation, before: context.completed });
-            let left_out = self.economy.left_out(context.world.has_hidden_light());
+            let departure = Departure { deviation, before: context.completed };
+            self.economy.judge(index, departure, context.world.has_hidden_light());
+            let left_out = self.economy.left_out();
             *context.counters.left_out.lock().unwrap_or_else(PoisonError::into_inner) = left_out;
         }
         true

@@ -111,35 +111,21 @@ impl Economy {
         Self::looks(index) || self.trial.is_some()
     }
 
-    /// How many of `all` light paths iteration `index` should sample. `some`: whether some must be, since there may be
-    /// light that camera paths cannot find.
-    pub fn light_paths(&self, all: f32, index: u32, some: bool) -> f32 {
-        match Self::looks(index) {
-            true => all,
-            false => match self.next(some) {
-                0.0 => 0.0,
-                share => (share * all).ceil().max(FEWEST).min(all),
-            },
-        }
-    }
-
-    /// Share of the light paths in an iteration that does not look.
-    fn usual(&self, some: bool) -> f32 {
-        if some { self.share.max(SHARES[1]) } else { self.share }
-    }
-
-    /// Share of the light paths in the next iteration, if it does not look.
-    fn next(&self, some: bool) -> f32 {
-        let tried = self.trial.map(|t| Self { share: SHARES[t.share], ..Self::default() });
-        tried.as_ref().unwrap_or(self).usual(some)
+    /// How many of `all` light paths iteration `index` should sample.
+    pub fn light_paths(&self, all: f32, index: u32) -> f32 {
+        let share = match (Self::looks(index), self.trial) {
+            (true, _) => 1.0,
+            (false, Some(trial)) => SHARES[trial.share],
+            (false, None) => self.share,
+        };
+        if share == 0.0 { 0.0 } else { (share * all).ceil().max(FEWEST).min(all) }
     }
 
     /// What is left out, for the log and the statistics.
-    pub fn left_out(&self, some: bool) -> Option<String> {
-        let share = self.usual(some);
-        let percent = 100.0 * (1.0 - share);
+    pub fn left_out(&self) -> Option<String> {
+        let percent = 100.0 * (1.0 - self.share);
         let why = "they cost more than they bring here";
-        (share < 1.0).then(|| format!("light paths, {percent:.0} % of them in most iterations: {why}"))
+        (self.share < 1.0).then(|| format!("light paths, {percent:.0} % of them in most iterations: {why}"))
     }
 
     /// Looks at an iteration that sampled all light paths, which were so many, or at one of its bands, which share their
@@ -158,13 +144,14 @@ impl Economy {
         self.costs = SHARES.map(f64::from).map(|r| camera + r * light + r.powf(PROBE_GROWTH) * probes);
     }
 
-    /// Judges after iteration `index`, by what was seen in it.
-    pub fn judge(&mut self, index: u32, departure: Departure) {
+    /// Judges after iteration `index`, by what was seen in it. `some`: whether some light paths there must be, since
+    /// there may be light that camera paths cannot find.
+    pub fn judge(&mut self, index: u32, departure: Departure, some: bool) {
         let Departure { deviation, before } = departure;
         // the mean of those before varies as well, at 1 / before of what they do
         let (squared, before) = (deviation * deviation, f64::from(before));
         if Self::looks(index) {
-            let [surely, perhaps] = [UNTOLD, TOLD].map(|factor| self.best(factor));
+            let [surely, perhaps] = [UNTOLD, TOLD].map(|factor| self.best(factor, usize::from(some)));
             self.share = SHARES[surely];
             let is_open = surely != perhaps && surely == ALL && before > 0.0;
             self.trial =
@@ -177,16 +164,16 @@ impl Economy {
         }
     }
 
-    /// The share at which error times cost is least, if what fewer light paths add to the variance is `factor` times
-    /// what is told.
-    fn best(&self, factor: f64) -> usize {
+    /// The share, from number `least` on, at which error times cost is least, if what fewer light paths add to the
+    /// variance is `factor` times what is told.
+    fn best(&self, factor: f64, least: usize) -> usize {
         let told = |k: usize| self.errors[k] * self.errors[k];
         let variance = |k: usize| {
             let added = told(k) - told(ALL);
             told(ALL) + if added > 0.0 { factor * added } else { added }
         };
         let product = |k: usize| variance(k) * self.costs[k];
-        let best = (0..ALL).min_by(|&a, &b| product(a).total_cmp(&product(b))).unwrap_or(ALL);
+        let best = (least..ALL).min_by(|&a, &b| product(a).total_cmp(&product(b))).unwrap_or(ALL);
         if WORTHWHILE * product(best) < product(ALL) { best } else { ALL }
     }
 }

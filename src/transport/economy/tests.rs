@@ -60,27 +60,43 @@ fn what_only_light_paths_find_keeps_them() {
     assert_eq!(of_row(camera(), [(0.0, 1.0)].into_iter()), [0.0; SHARES.len()]);
 }
 
-/// After an iteration with all light paths that told nothing between `UNTOLD` and `TOLD` apart.
-fn on_trial() -> Economy {
+/// After an iteration with all light paths that left it open whether they pay. `some`: as in [`Economy::judge`].
+fn on_trial(some: bool) -> Economy {
     let mut economy =
         Economy { errors: [1.2, 1.15, 1.1, 1.0], costs: [5.0, 5.6, 7.0, 10.0], ..Economy::default() };
-    economy.judge(3, Departure { deviation: 2.0, before: 3 });
+    economy.judge(3, Departure { deviation: 2.0, before: 3 }, some);
     economy
 }
 
 #[test]
 fn what_is_open_is_tried_once() {
-    let mut economy = on_trial();
-    assert!(economy.compares(4) && economy.light_paths(5000.0, 4, false) == 0.0);
-    // a hidden light has its sixteenth in the trial, too
-    assert_eq!(economy.light_paths(5000.0, 4, true), 313.0);
+    let mut economy = on_trial(false);
+    assert!(economy.compares(4) && economy.light_paths(5000.0, 4) == 0.0);
     // variance with all: 4 * 3/4 = 3; without: 4.5 - 3/4 = 3.75 at half the cost
-    economy.judge(4, Departure { deviation: 4.5f64.sqrt(), before: 4 });
-    assert!(!economy.compares(5) && economy.light_paths(5000.0, 5, false) == 0.0);
+    economy.judge(4, Departure { deviation: 4.5f64.sqrt(), before: 4 }, false);
+    assert!(!economy.compares(5) && economy.light_paths(5000.0, 5) == 0.0);
     // and where the pictures are much noisier, all stay: 6.5 - 3/4 = 5.75
-    let mut economy = on_trial();
-    economy.judge(4, Departure { deviation: 6.5f64.sqrt(), before: 4 });
-    assert_eq!(economy.light_paths(5000.0, 5, false), 5000.0);
+    let mut economy = on_trial(false);
+    economy.judge(4, Departure { deviation: 6.5f64.sqrt(), before: 4 }, false);
+    assert_eq!(economy.light_paths(5000.0, 5), 5000.0);
+}
+
+#[test]
+fn a_hidden_light_keeps_a_sixteenth_at_least() {
+    let mut economy = on_trial(true);
+    assert_eq!(economy.light_paths(5000.0, 4), 313.0);
+    economy.judge(4, Departure { deviation: 4.0f64.sqrt(), before: 4 }, true);
+    assert_eq!(economy.light_paths(5000.0, 5), 313.0);
+    assert_eq!(economy.light_paths(500.0, 5), FEWEST);
+    assert_eq!(economy.light_paths(5.0, 5), 5.0);
+}
+
+#[test]
+fn nothing_is_tried_where_there_is_nothing_to_compare() {
+    let mut economy =
+        Economy { errors: [1.2, 1.15, 1.1, 1.0], costs: [5.0, 5.6, 7.0, 10.0], ..Economy::default() };
+    economy.judge(0, Departure { deviation: 0.0, before: 0 }, false);
+    assert!(!economy.compares(1) && economy.light_paths(5000.0, 1) == 5000.0);
 }
 
 #[test]
@@ -88,10 +104,7 @@ fn all_are_sampled_at_first_and_now_and_then() {
     let none = Economy { share: 0.0, ..Economy::default() };
     for k in 0..17 {
         let all = if [0, 3, 15].contains(&k) { 5000.0 } else { 0.0 };
-        assert_eq!(none.light_paths(5000.0, k, false), all, "{k}");
+        assert_eq!(none.light_paths(5000.0, k), all, "{k}");
     }
-    assert_eq!(none.light_paths(5000.0, 1, true), 313.0);
-    assert_eq!(none.light_paths(500.0, 1, true), FEWEST);
-    assert_eq!(none.light_paths(5.0, 1, true), 5.0);
-    assert_eq!(Economy::default().light_paths(5.0, 1, false), 5.0);
+    assert_eq!(Economy::default().light_paths(5.0, 1), 5.0);
 }

@@ -1,0 +1,62 @@
+"""Renders a shared stage with Mitsuba for so many processor seconds of a thread, twice, into numpy files.
+
+Runs in the environment PEERS_PYTHON, in the folder of the shared harness, whose `usd2mitsuba` builds the scene:
+mitsuba_stage.py STAGE WIDTH SECONDS THREADS OUT
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from pathlib import Path
+
+import numpy as np
+
+#: Samples a pixel of one call.
+STEP = 4
+#: Bounces, and one for the light.
+DEPTH = 65
+
+
+def processor_seconds() -> float:
+    """Of this process."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
+
+
+def main(stage: str, width: int, seconds: float, threads: int, out: Path) -> None:
+    """Writes the two pictures, and how many seconds of a thread each took."""
+    sys.argv = ["usd2mitsuba", stage, str(out)]
+    sys.path.insert(0, ".")
+    import drjit
+    import mitsuba
+
+    # the harness asks for the scalar variant, which is many times slower
+    choose = mitsuba.set_variant
+    mitsuba.set_variant = lambda _: choose("llvm_ad_rgb")
+    drjit.set_thread_count(threads)
+    import usd2mitsuba
+
+    scene = usd2mitsuba.build(stage, width, 1, DEPTH)
+    np.asarray(mitsuba.render(scene, spp=STEP, seed=2**31 - 1))  # compiles
+    pictures, times, seed = [], [], 0
+    for _ in range(2):
+        start, total, calls = processor_seconds(), 0.0, 0
+        while processor_seconds() - start < seconds * threads:
+            total = total + np.asarray(mitsuba.render(scene, spp=STEP, seed=seed))
+            calls, seed = calls + 1, seed + 1
+        pictures.append(total[..., :3] / calls)
+        times.append((processor_seconds() - start) / threads)
+    np.save(out, np.array(pictures, dtype=np.float64))
+    print(json.dumps(times))
+
+
+if __name__ == "__main__":
+    main(
+        sys.argv[1],
+        int(sys.argv[2]),
+        float(sys.argv[3]),
+        int(sys.argv[4]),
+        Path(sys.argv[5]),
+    )
