@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from sections import replace_section
 from segue import Render, usd
-from two_references import SHARP, relative_error, smooth
+from two_references import SHARP, relative_error, relative_noise
 
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared"))
@@ -36,26 +36,15 @@ HEADING = "Scenes made by others"
 HEAD = f"""relMSE after {SECONDS:g} seconds of {THREADS} threads (processor seconds over threads; loading, building and compiling left out), {WIDTH}
 pixels wide, by `benches/interiors.py`. `segment` and `path`: against two references by `segment` with a fixed kernel of a third of a pixel and other seeds,
 {2 * SECONDS:g} s each, so that blur and whatever else is wrong with the pictures counts. Mitsuba (`llvm_ad_rgb`, `path`, the scenes' original materials, which
-differ a little): noise alone, from two renders of other seeds. The last columns leave out the worst hundredth of the pixels.
+differ a little): noise alone, from two renders of other seeds.
 
-| scene | `segment` | `path` | Mitsuba | Mitsuba over `segment` | `segment`, 99 % | Mitsuba, 99 % | ratio |
-| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
+| scene | `segment` | `path` | Mitsuba | Mitsuba over `segment` |
+| --- | ---: | ---: | ---: | ---: |
 """
 
 
-def without_worst(errors: np.ndarray) -> float:
-    """Mean without the largest hundredth."""
-    ordered = np.sort(errors.ravel())
-    return float(ordered[: int(0.99 * ordered.size)].mean())
-
-
-def relative(squares: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Squared errors of pixels, relative to the squared local means."""
-    return (squares / (smooth(mean) ** 2 + (0.01 * mean.mean()) ** 2)).mean(axis=-1)
-
-
-def theirs(stage: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Mitsuba's pictures, and the relative errors of its pixels at the time that counts."""
+def theirs(stage: Path) -> tuple[tuple[int, int], float]:
+    """Resolution of Mitsuba's pictures, and their relative error at the time that counts."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "pictures.npy"
         command = [
@@ -76,16 +65,15 @@ def theirs(stage: Path) -> tuple[np.ndarray, np.ndarray]:
         )
         a, b = np.load(out)
     seconds = np.mean(json.loads(done.stdout.splitlines()[-1]))
-    mean = (a + b) / 2
-    return mean, relative((a - b) ** 2 / 2, mean) * (seconds / SECONDS)
+    return (a.shape[1], a.shape[0]), relative_noise(a, b) * seconds / SECONDS
 
 
 def row(name: str) -> str:
     """The table's row of a scene."""
     stage = SHARED / "scenes" / name / f"{name}.usdc"
-    mean, noise = theirs(stage)
+    resolution, noise = theirs(stage)
     scene = usd.load(stage).scene
-    common = {"resolution": [mean.shape[1], mean.shape[0]], "threads": THREADS}
+    common = {"resolution": list(resolution), "threads": THREADS}
 
     def picture(**settings: object) -> tuple[np.ndarray, float]:
         job = Render(scene, {**common, **settings})
@@ -97,17 +85,12 @@ def row(name: str) -> str:
         picture(time=2 * SECONDS, **{**SHARP, "seed": SHARP["seed"] + k})[0]
         for k in range(2)
     )
-    both = (first + second) / 2
-    found = {}
+    errors = []
     for method in ("segment", "path"):
         ours, time = picture(integrator=method, time=SECONDS)
-        errors = relative((ours - first) * (ours - second), both) * time
-        found[method] = relative_error(ours, first, second) * time, errors
-    (segment, errors), (path, _) = found["segment"], found["path"]
-    calm, their_calm = without_worst(errors), without_worst(noise)
-    cells = [f"{segment:.2g}", f"{path:.2g}", f"{noise.mean():.2g}"]
-    cells += [f"{noise.mean() / segment:.2g}", f"{calm:.2g}", f"{their_calm:.2g}"]
-    return f"| {name} | " + " | ".join(cells) + f" | {their_calm / calm:.2g} |"
+        errors.append(relative_error(ours, first, second) * time)
+    cells = [f"{e:.2g}" for e in (*errors, noise, noise / errors[0])]
+    return f"| {name} | " + " | ".join(cells) + " |"
 
 
 def main(names: list[str]) -> int:

@@ -18,8 +18,17 @@ def smooth(picture: np.ndarray, radius: int = 2) -> np.ndarray:
     return squares.mean(axis=(-2, -1))
 
 
+def relative(squares: np.ndarray, mean: np.ndarray) -> float:
+    """Mean of squared errors over squared local means of a picture."""
+    return float((squares / (smooth(mean) ** 2 + (0.01 * mean.mean()) ** 2)).mean())
+
+
 def relative_error(picture: np.ndarray, first: np.ndarray, second: np.ndarray) -> float:
-    """Relative mean squared error: the product of the differences from both references, over squared local means."""
-    mean = (first + second) / 2
-    scale = smooth(mean) ** 2 + (0.01 * mean.mean()) ** 2
-    return float(((picture - first) * (picture - second) / scale).mean())
+    """Relative mean squared error: squares are products of the differences from both references."""
+    squares = (picture - first) * (picture - second)
+    return relative(squares, (first + second) / 2)
+
+
+def relative_noise(a: np.ndarray, b: np.ndarray) -> float:
+    """Relative variance of each of two pictures that differ by noise alone."""
+    return relative((a - b) ** 2 / 2, (a + b) / 2)
