@@ -3,7 +3,7 @@
 Needs the scenes and references that are shared between renderers (SEGUE_SHARED, or ../shared beside the
 checkout); without them it says so and does nothing. `gallery` needs them for two of its scenes, `pictures` needs what
 `cargo test --release --test method_pictures -- --ignored` draws. Run:
-.venv/bin/python benches/method.py table [SCENE ...]|consistency|gallery [SCENE ...]|plot|pictures
+.venv/bin/python benches/method.py table [SCENE ...]|consistency|units|gallery [SCENE ...]|plot|pictures
 """
 
 from __future__ import annotations
@@ -42,7 +42,17 @@ SIZES = (4.0, 1.0, 0.25)
 SETS: dict[str, dict[str, Any]] = {
     "both": {},
     "camera": {"light_paths": 0},
+    "light": {"integrator": "photon-filter"},
     "both, no next event": {"next_event": False},
+}
+#: Scenes of one light over a wall, and the method beside which their means are looked at.
+UNITS = {
+    "unit_bulb": "vcm",
+    "unit_disk": "path",
+    "unit_env": "path",
+    "unit_point": "path",
+    "unit_rect": "path",
+    "unit_sphere": "path",
 }
 
 
@@ -149,6 +159,23 @@ def gallery(seeds: int = 6) -> None:
             print(json.dumps(row), flush=True)
 
 
+def units(seeds: int = 6) -> None:
+    """Means of one light over a wall each, with a fixed kernel of a quarter of a pixel, as JSON lines."""
+    for name, unbiased in UNITS.items():
+        scene = usd.load(SHARED / "usd" / f"{name}.usda").scene
+        common = {"resolution": [64, 64], "samples": 64, "kernel": "fixed"}
+        small = {"integrator": unbiased, "kernel_size": 0.5}
+        expected = means(scene, seeds, **common, **small)
+        for what, techniques in SETS.items():
+            got = means(
+                scene, seeds, **common, **{"kernel_size": SIZES[-1], **techniques}
+            )
+            off = (got - expected) / expected.mean()
+            row = {"scene": name, "against": unbiased, "techniques": what}
+            row |= {"off": off.mean(), "error": off.std(ddof=1) / seeds**0.5}
+            print(json.dumps(row), flush=True)
+
+
 def plot() -> None:
     """The output of `consistency`, from the standard input, as a picture."""
     from matplotlib import pyplot
@@ -158,7 +185,7 @@ def plot() -> None:
         2, 3, figsize=(11, 6), sharex=True, constrained_layout=True
     )
     for axis, name in zip(axes.flat, SCENES, strict=True):
-        for what in SETS:
+        for color, what in enumerate(SETS):
             found = [r for r in rows if r["scene"] == name and r["techniques"] == what]
             # a set that cannot find the paths says nothing
             if (
@@ -173,7 +200,14 @@ def plot() -> None:
             )
             bars = [100 * r["error"] for r in found]
             axis.errorbar(
-                sizes, means, bars, label=what, marker="o", markersize=3, capsize=2
+                sizes,
+                means,
+                bars,
+                label=what,
+                color=f"C{color}",
+                marker="o",
+                markersize=3,
+                capsize=2,
             )
         known = 100 * KNOWN_TO.get(name, 0.002)
         axis.axhspan(-known, known, color="0.9")
@@ -190,7 +224,7 @@ def plot() -> None:
         handles.values(),
         handles.keys(),
         loc="outside upper center",
-        ncols=3,
+        ncols=4,
         frameon=False,
     )
     figure.savefig(PICTURES / "consistency.png", dpi=100)
@@ -221,8 +255,8 @@ def pictures() -> None:
 
 if __name__ == "__main__":
     command = sys.argv[1]
-    if command in ("table", "consistency") and not (SHARED / "refs").is_dir():
+    if command in ("table", "consistency", "units") and not (SHARED / "refs").is_dir():
         sys.exit(f"skipped: {SHARED} does not exist")
     PICTURES.mkdir(exist_ok=True)
-    commands = (table, consistency, gallery, plot, pictures)
+    commands = (table, consistency, units, gallery, plot, pictures)
     {f.__name__: f for f in commands}[command]()

@@ -65,6 +65,8 @@ pub struct Segment {
     starts: Vec<u32>,
     /// How many light paths pay.
     economy: Economy,
+    /// For every band, the picture before the last iteration that looked whether they do.
+    yardsticks: Vec<Shown>,
 }
 
 impl Segment {
@@ -121,8 +123,11 @@ impl Segment {
             bands: bands.len(),
         };
         let compares = self.is_thrifty(context) && self.economy.compares(index);
+        if lessons.looks {
+            self.yardsticks.clear();
+        }
         let mut deviation = 0.0;
-        for band in bands {
+        for (k, band) in bands.into_iter().enumerate() {
             let crop = Rect { x: context.crop.x + band.x, y: context.crop.y + band.y, ..band };
             let of_band = Context { crop, ..*context };
             if !self.transport(&of_band, index, light_paths, cut, costs) {
@@ -131,8 +136,14 @@ impl Segment {
             let before = if compares { Shown::of(context.film, band) } else { None };
             self.gather(&of_band, band);
             costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-            if let Some((before, after)) = before.zip(Shown::of(context.film, band)) {
-                deviation += f64::from(context.completed + 1) * before.deviation(&after);
+            if let Some(before) = before
+                && let Some(after) = Shown::of(context.film, band)
+            {
+                let latest = before.latest(&after, context.completed);
+                if lessons.looks {
+                    self.yardsticks.push(before);
+                }
+                deviation += self.yardsticks.get(k).map_or(0.0, |y| y.deviation(&latest));
             }
             if lessons.guides || lessons.looks {
                 let bytes = self.learn(&of_band, band, &lessons, cut);

@@ -37,6 +37,8 @@ const UNTOLD: f64 = 3.0;
 const TOLD: f64 = 1.0;
 /// Gain that is worth the risk of leaving light paths out: what they have not found so far is not known.
 const WORTHWHILE: f64 = 1.1;
+/// Gain that a trial has to show: one iteration tells the ratio of variances to two fifths (`benches/NOTES.md`).
+const PROVEN: f64 = 1.25;
 /// So many light paths at least, if any: those of a cluster would else be parts of one path, and what is estimated by
 /// one of them would depend on the density of the others (1 % dark with four).
 const FEWEST: f32 = 64.0;
@@ -51,7 +53,7 @@ type PerShare = [f64; SHARES.len()];
 pub struct Economy {
     /// For every share, the sum of what pixels are off, as far as it has been looked at.
     errors: PerShare,
-    /// For every share, arrivals sampled and what else costs as much, of the last iteration that looked.
+    /// For every share, arrivals sampled and what else costs as much, of all iterations that looked.
     costs: PerShare,
     /// Share of the light paths that pays.
     share: f32,
@@ -70,16 +72,18 @@ impl Default for Economy {
 struct Trial {
     /// Which of [`SHARES`].
     share: usize,
-    /// Variance of a picture with all light paths.
+    /// Squared departure of the picture with all light paths.
     with_all: f64,
+    /// Iterations from whose mean it departed.
+    before: u32,
 }
 
-/// How far the picture of an iteration is from the mean of those before.
+/// How far the picture of an iteration is from the mean of those before the last that looked.
 #[derive(Clone, Copy, Debug)]
 pub struct Departure {
     /// Standard deviation by pixel brightness, in units that are the same from iteration to iteration.
     pub deviation: f64,
-    /// Iterations before.
+    /// Iterations before, which that mean is of where this one looks.
     pub before: u32,
 }
 
@@ -141,26 +145,29 @@ impl Economy {
         let camera = (s.camera.arrivals.len() + starts.len()) as f64;
         let light = (s.light.arrivals.len() as f64 + f64::from(light_paths)) / bands as f64;
         let probes = PROBE * s.clusters.probes as f64;
-        self.costs = SHARES.map(f64::from).map(|r| camera + r * light + r.powf(PROBE_GROWTH) * probes);
+        let costs = SHARES.map(f64::from).map(|r| camera + r * light + r.powf(PROBE_GROWTH) * probes);
+        self.costs.iter_mut().zip(costs).for_each(|(sum, v)| *sum += v);
     }
 
     /// Judges after iteration `index`, by what was seen in it. `some`: whether some light paths there must be, since
     /// there may be light that camera paths cannot find.
     pub fn judge(&mut self, index: u32, departure: Departure, some: bool) {
         let Departure { deviation, before } = departure;
-        // the mean of those before varies as well, at 1 / before of what they do
-        let (squared, before) = (deviation * deviation, f64::from(before));
+        let squared = deviation * deviation;
         if Self::looks(index) {
             let [surely, perhaps] = [UNTOLD, TOLD].map(|factor| self.best(factor, usize::from(some)));
-            self.share = SHARES[surely];
-            let is_open = surely != perhaps && surely == ALL && before > 0.0;
-            self.trial =
-                is_open.then_some(Trial { share: perhaps, with_all: squared * before / (before + 1.0) });
-        } else if let Some(Trial { share, with_all }) = self.trial.take() {
-            let with_fewer = squared - with_all / before;
-            if WORTHWHILE * with_fewer * self.costs[share] < with_all * self.costs[ALL] {
-                self.share = SHARES[share];
+            let is_open = surely == ALL && perhaps != ALL && before > 0;
+            self.trial = is_open.then_some(Trial { share: perhaps, with_all: squared, before });
+            // what is open stays as it is until it has been tried
+            if !is_open {
+                self.share = SHARES[surely];
             }
+        } else if let Some(Trial { share, with_all, before }) = self.trial.take() {
+            // the mean varies as well, about as much as so many iterations with all light paths
+            let of_mean = with_all / f64::from(before + 1);
+            let (with_fewer, with_all) = ((squared - of_mean).max(0.0), with_all - of_mean);
+            let pays = PROVEN * with_fewer * self.costs[share] < with_all * self.costs[ALL];
+            self.share = if pays { SHARES[share] } else { 1.0 };
         }
     }
 

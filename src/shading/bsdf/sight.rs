@@ -29,7 +29,7 @@ pub struct Sight<'a> {
     side: f32,
     choice: Choice,
     /// The direction in each lobe's frame.
-    locals: SmallVec<[Option<Vec3>; 2]>,
+    locals: SmallVec<[Option<Vec3>; 4]>,
 }
 
 impl Bsdf {
@@ -49,28 +49,22 @@ impl Bsdf {
 impl Sight<'_> {
     /// Effective BSDF with this as the camera's side (1/sr), and the density of drawing `to`.
     pub fn look(&self, to: Vec3) -> (Vec3, ProjectedPdf) {
-        let cos = self.bsdf.ng.dot(to);
-        if cos.abs() < MIN_COS {
-            return (Vec3::ZERO, ProjectedPdf(0.0));
-        }
-        let (value, pdf) = self.scattered(to, 1f32.copysign(cos));
-        (value / cos.abs(), ProjectedPdf(pdf / cos.abs()))
+        let Some(side) = self.bsdf.side_of(to) else { return (Vec3::ZERO, ProjectedPdf(0.0)) };
+        let (value, pdf) = self.scattered(to, side);
+        let cos = self.bsdf.ng.dot(to).abs();
+        (value / cos, ProjectedPdf(pdf / cos))
     }
 
     /// Density of drawing `to` from the continuous lobes.
     pub fn pdf(&self, to: Vec3) -> ProjectedPdf {
-        let cos = self.bsdf.ng.dot(to);
-        if cos.abs() < MIN_COS {
-            return ProjectedPdf(0.0);
-        }
-        let side = 1f32.copysign(cos);
+        let Some(side) = self.bsdf.side_of(to) else { return ProjectedPdf(0.0) };
         let mut sum = 0.0;
         for (k, e, from) in self.continuous() {
             if let Some(to) = e.scattered(to, side) {
                 sum += self.choice.probability(k) * e.lobe.pdf(from, to).0 * to.z.abs();
             }
         }
-        ProjectedPdf(sum / cos.abs())
+        ProjectedPdf(sum / self.bsdf.ng.dot(to).abs())
     }
 
     /// Value and density of all lobes, each times `|ns.to|`, for a direction on the geometric side `side`.
@@ -171,7 +165,7 @@ struct Choice {
     len: usize,
     cumulative: [f32; CAPACITY],
     /// Albedos of the lobes, where they had to be known.
-    albedos: SmallVec<[Vec3; 2]>,
+    albedos: SmallVec<[Vec3; 4]>,
 }
 
 impl Choice {

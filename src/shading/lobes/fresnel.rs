@@ -35,7 +35,7 @@ pub fn reflectance(c: f32, t: f32, eta: f32) -> f32 {
 }
 
 /// Average over the hemisphere, `2 integral F(mu) mu dmu`, of the dielectric reflectance for `eta >= 1`. Every shaded
-/// surface asks for it, so it is read from a table, to some 1e-6.
+/// surface asks for it, so it is read from a table, to 5e-6.
 pub fn dielectric_average(eta: f32) -> f32 {
     const NODES: usize = 2048;
     // divided by z = (eta - 1) / (eta + 1), by which the nodes are evenly spaced; the last one is that of infinity

@@ -72,12 +72,12 @@ fn on_trial(some: bool) -> Economy {
 fn what_is_open_is_tried_once() {
     let mut economy = on_trial(false);
     assert!(economy.compares(4) && economy.light_paths(5000.0, 4) == 0.0);
-    // variance with all: 4 * 3/4 = 3; without: 4.5 - 3/4 = 3.75 at half the cost
-    economy.judge(4, Departure { deviation: 4.5f64.sqrt(), before: 4 }, false);
+    // variance with all: 4 - 4/4 = 3, without: 5.5 - 4/4 = 4.5, at half the cost
+    economy.judge(4, Departure { deviation: 5.5f64.sqrt(), before: 3 }, false);
     assert!(!economy.compares(5) && economy.light_paths(5000.0, 5) == 0.0);
-    // and where the pictures are much noisier, all stay: 6.5 - 3/4 = 5.75
+    // and where the pictures are much noisier, all stay: 6.5 - 4/4 = 5.5
     let mut economy = on_trial(false);
-    economy.judge(4, Departure { deviation: 6.5f64.sqrt(), before: 4 }, false);
+    economy.judge(4, Departure { deviation: 6.5f64.sqrt(), before: 3 }, false);
     assert_eq!(economy.light_paths(5000.0, 5), 5000.0);
 }
 
@@ -85,7 +85,7 @@ fn what_is_open_is_tried_once() {
 fn a_hidden_light_keeps_a_sixteenth_at_least() {
     let mut economy = on_trial(true);
     assert_eq!(economy.light_paths(5000.0, 4), 313.0);
-    economy.judge(4, Departure { deviation: 4.0f64.sqrt(), before: 4 }, true);
+    economy.judge(4, Departure { deviation: 4.0f64.sqrt(), before: 3 }, true);
     assert_eq!(economy.light_paths(5000.0, 5), 313.0);
     assert_eq!(economy.light_paths(500.0, 5), FEWEST);
     assert_eq!(economy.light_paths(5.0, 5), 5.0);
