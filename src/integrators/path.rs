@@ -7,7 +7,7 @@
 use super::{Context, Integrator, IterationEnd, record};
 use crate::film::{Sample, SharedTile};
 use crate::math::Sampler;
-use crate::shading::bsdf::{Among, Bsdf, Sight, Walk};
+use crate::shading::bsdf::{Among, Sight, Walk};
 use crate::shading::emitters::Receiver;
 use crate::shading::lobes::Density;
 use crate::shading::{CameraRay, LightPoint, Piece, Shaded, SurfacePoint, World};
@@ -167,7 +167,7 @@ impl PathWalk<'_, '_> {
             let receiver = hit.receiver(bsdf, wo);
             let Some(sight) = bsdf.sight(wo, Among::All) else { return };
             if bsdf.has_smooth() {
-                let direct = self.next_event(&hit, &receiver, bsdf, &sight, wo) * throughput.radiance();
+                let direct = self.next_event(&hit, &receiver, &sight) * throughput.radiance();
                 record(sample, depth + 1, direct);
             }
             let Some(s) = sight.sample(Walk::Camera, self.sampler.next_3d()) else { return };
@@ -203,15 +203,8 @@ impl PathWalk<'_, '_> {
         }
     }
 
-    /// Light that reaches the vertex from a drawn point of a light, scattered towards `wo`.
-    fn next_event(
-        &mut self,
-        hit: &SurfacePoint,
-        receiver: &Receiver,
-        bsdf: &Bsdf,
-        sight: &Sight,
-        wo: Vec3,
-    ) -> Vec3 {
+    /// Light that reaches the vertex from a drawn point of a light, scattered towards where it is seen from.
+    fn next_event(&mut self, hit: &SurfacePoint, receiver: &Receiver, sight: &Sight) -> Vec3 {
         let u = self.sampler.next_3d();
         let world = self.context.world;
         let Some(light) = world.sample_light(receiver, u) else { return Vec3::ZERO };
@@ -226,7 +219,7 @@ impl PathWalk<'_, '_> {
             false => power_heuristic(light.pdf, pdf.0 * cos),
         };
         // the light's radiance is basic radiance once divided by the squared index of its own side
-        let to_radiance = bsdf.relative_index(wo, light.direction).powi(-2);
+        let to_radiance = sight.relative_index(light.direction).powi(-2);
         f * light.radiance
             * (weight * to_radiance / light.pdf)
             * world.transmittance(hit, &light, &mut self.rays)

@@ -136,9 +136,9 @@ impl Segment {
             let before = if compares { Shown::of(context.film, band) } else { None };
             self.gather(&of_band, band);
             costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
-            if let Some(before) = before
-                && let Some(after) = Shown::of(context.film, band)
-            {
+            let after = if lessons.guides || compares { Shown::of(context.film, band) } else { None };
+            let Some(after) = after else { continue };
+            if let Some(before) = before {
                 let latest = before.latest(&after, context.completed);
                 if lessons.looks {
                     self.yardsticks.push(before);
@@ -146,7 +146,7 @@ impl Segment {
                 deviation += self.yardsticks.get(k).map_or(0.0, |y| y.deviation(&latest));
             }
             if lessons.guides || lessons.looks {
-                let bytes = self.learn(&of_band, band, &lessons, cut);
+                let bytes = self.learn(&of_band, &after, &lessons, cut);
                 costs.stage("learning", bytes);
             }
         }
@@ -349,8 +349,7 @@ impl Segment {
 
     /// Learns from a band where light paths should begin and how many of them pay, by what they bring as a share of what
     /// is shown. Returns the bytes that it took.
-    fn learn(&mut self, context: &Context, band: Rect, lessons: &Lessons, cut: &Cut) -> usize {
-        let Some(shown) = Shown::of(context.film, band) else { return 0 };
+    fn learn(&mut self, context: &Context, shown: &Shown, lessons: &Lessons, cut: &Cut) -> usize {
         let starts = self.primaries.iter().zip(shown.scales()).filter_map(|(p, scale)| {
             let worth = p.weight * (LUMINANCE / scale);
             let worth = if worth.is_finite() { worth } else { Vec3::ZERO };

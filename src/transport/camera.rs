@@ -288,7 +288,6 @@ impl CameraSampler<'_> {
     ) -> Option<(NextEvent, Vec3)> {
         let u = sampler.next_3d();
         let light = self.world.sample_light(receiver, u)?;
-        let bsdf = &end.vertex.bsdf;
         let cos = end.hit.place.normal.dot(light.direction).abs();
         let (value, ProjectedPdf(pdf)) = sight.look(light.direction);
         // arrivals from the other side of a surface that transmits share its cluster, and may use what this one cannot
@@ -300,7 +299,7 @@ impl CameraSampler<'_> {
         if visible == Vec3::ZERO || light.radiance == Vec3::ZERO {
             return None;
         }
-        let index = bsdf.relative_index(end.wo, light.direction);
+        let index = sight.relative_index(light.direction);
         let arriving = light.radiance * visible * (inverse_n2 / (index * index));
         let paths = match self.light_paths > 0.0 {
             true => {

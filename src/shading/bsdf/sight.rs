@@ -50,9 +50,21 @@ impl Sight<'_> {
     /// Effective BSDF with this as the camera's side (1/sr), and the density of drawing `to`.
     pub fn look(&self, to: Vec3) -> (Vec3, ProjectedPdf) {
         let Some(side) = self.bsdf.side_of(to) else { return (Vec3::ZERO, ProjectedPdf(0.0)) };
-        let (value, pdf) = self.scattered(to, side);
+        let (mut value, mut pdf) = (Vec3::ZERO, 0.0);
+        for (k, e, from) in self.continuous() {
+            if let Some(to) = e.scattered(to, side) {
+                let (f, p) = e.lobe.eval_and_pdf(from, to);
+                value += e.weight * f * to.z.abs();
+                pdf += self.choice.probability(k) * p.0 * to.z.abs();
+            }
+        }
         let cos = self.bsdf.ng.dot(to).abs();
         (value / cos, ProjectedPdf(pdf / cos))
+    }
+
+    /// [`Bsdf::relative_index`] towards `to`.
+    pub fn relative_index(&self, to: Vec3) -> f32 {
+        self.bsdf.relative_index(self.from, to)
     }
 
     /// Density of drawing `to` from the continuous lobes.
@@ -65,20 +77,6 @@ impl Sight<'_> {
             }
         }
         ProjectedPdf(sum / self.bsdf.ng.dot(to).abs())
-    }
-
-    /// Value and density of all lobes, each times `|ns.to|`, for a direction on the geometric side `side`.
-    #[inline]
-    fn scattered(&self, to: Vec3, side: f32) -> (Vec3, f32) {
-        let (mut value, mut pdf) = (Vec3::ZERO, 0.0);
-        for (k, e, from) in self.continuous() {
-            if let Some(to) = e.scattered(to, side) {
-                let (f, p) = e.lobe.eval_and_pdf(from, to);
-                value += e.weight * f * to.z.abs();
-                pdf += self.choice.probability(k) * p.0 * to.z.abs();
-            }
-        }
-        (value, pdf)
     }
 
     /// Continuous lobes that are seen, with their numbers and the direction in their frames.
@@ -121,11 +119,11 @@ impl Sight<'_> {
             }
             (false, Walk::Camera) => {
                 let (value, pdf) = self.look(direction);
-                (value, Density::Projected(pdf), bsdf.relative_index(from, direction))
+                (value, Density::Projected(pdf), self.relative_index(direction))
             }
             (false, Walk::Light) => {
                 let value = bsdf.eval_flux(from, direction);
-                (value, Density::Projected(self.pdf(direction)), bsdf.relative_index(from, direction))
+                (value, Density::Projected(self.pdf(direction)), self.relative_index(direction))
             }
         };
         let usable = pdf.value() > 0.0 && pdf.value().is_finite() && value.max_element() > 0.0;
