@@ -23,16 +23,15 @@ ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared"))
 REPORTS = ROOT / "docs" / "convergence"
 METHODS = "segment,segment-fixed,mvf,photon-filter,bpm,vcm,path"
-#: Stages, with resolutions where no reference has one.
+#: Names in the shared scenes, resolutions, and seconds of one thread for a reference.
 INTERIORS = {
-    "bathroom": (SHARED / "scenes" / "bathroom" / "bathroom.usdc", (180, 120)),
-    "kitchen": (SHARED / "scenes" / "kitchen-ppg" / "kitchen-ppg.usdc", (180, 120)),
+    "bathroom": ("bathroom", (180, 120), 900.0),
+    "kitchen": ("kitchen-ppg", (180, 120), 2400.0),
 }
 OTHERS = ("cornell_glass", "lamp", "ajar_door", "glossy_box")
 #: References of the interiors are kept here and taken up again; delete them to make them anew.
 KEPT = ROOT / "build" / "references"
-#: Seconds of one thread for a reference, and for each method.
-REFERENCE_SECONDS = {"bathroom": 900.0, "kitchen": 2400.0}
+#: Seconds of one thread for each method.
 SECONDS = 30.0
 KERNEL = 0.35
 
@@ -87,20 +86,20 @@ def main(names: list[str]) -> int:
     REPORTS.mkdir(parents=True, exist_ok=True)
     for name in names or [*INTERIORS, *OTHERS]:
         stage = SHARED / "peers" / "usd" / f"{name}.usda"
-        resolution = (0, 0)
         if name in INTERIORS:
-            stage, resolution = INTERIORS[name]
+            folder, resolution, seconds = INTERIORS[name]
+            stage = SHARED / "scenes" / folder / f"{folder}.usdc"
         if not stage.exists():
             print(f"skipped: {stage} does not exist", flush=True)
             continue
-        with tempfile.TemporaryDirectory() as folder:
-            made = Path(folder) / "reference.exr"
+        with tempfile.TemporaryDirectory() as scratch:
             if name in INTERIORS:
                 made = KEPT / f"{name}.exr"
                 made.parent.mkdir(parents=True, exist_ok=True)
                 if not made.exists():
-                    reference(stage, resolution, REFERENCE_SECONDS[name], made)
+                    reference(stage, resolution, seconds, made)
             else:
+                made = Path(scratch) / "reference.exr"
                 resolution = halved(SHARED / "peers" / "refs" / f"{name}.exr", made)
             command = [sys.executable, "-m", "segue", "converge", str(stage), "--quiet"]
             command += ["--methods", METHODS, "--time", str(SECONDS), "--threads", "1"]

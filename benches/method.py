@@ -120,12 +120,33 @@ def means(scene: Any, seeds: int, **settings: Any) -> np.ndarray:
     return np.array([picture.mean(dtype=float) for picture in pictures])
 
 
-def gallery(seeds: int = 6) -> None:
-    """Means of scenes by size of a fixed kernel, beside an unbiased method, as JSON lines.
+def print_offsets(
+    name: str,
+    scene: Any,
+    unbiased: str,
+    tries: dict[str, dict],
+    seeds: int,
+    **common: Any,
+) -> None:
+    """How far the means of these settings are from those of an unbiased method, with standard errors, as JSON lines.
 
-    All methods take the same camera samples for a seed, so what camera rays see straight or through glass (glints of
-    the sun, mostly) has no part in the differences, whose standard errors are printed.
+    All take the same camera samples for a seed, so what camera rays see straight or through glass (glints of the sun,
+    mostly) has no part in the differences.
     """
+    common = {"kernel": "fixed", **common}
+    # the disks of `vcm` lose light at edges: small ones
+    expected = means(scene, seeds, **common, integrator=unbiased, kernel_size=0.5)
+    for what, settings in tries.items():
+        got = means(scene, seeds, **{**common, **settings})
+        off = (got - expected) / expected.mean()
+        row = {"scene": name, "against": unbiased, "method": what}
+        row |= {"off": off.mean(), "error": off.std(ddof=1) / seeds**0.5}
+        print(json.dumps(row), flush=True)
+
+
+def gallery(seeds: int = 6) -> None:
+    """Means of scenes by size of a fixed kernel, beside an unbiased method."""
+    tries = {f"segment {s:g} px": {"kernel_size": s} for s in SIZES}
     for name in sys.argv[2:] or GALLERY:
         unbiased, samples, light_paths = GALLERY[name]
         folder = SHARED if name.startswith("usd/") else ROOT / "scenes"
@@ -133,47 +154,18 @@ def gallery(seeds: int = 6) -> None:
             print(f"skipped: {folder / name}.usda does not exist", file=sys.stderr)
             continue
         scene = usd.load(folder / f"{name}.usda").scene
-        kernels = {f"segment {s:g} px": {"kernel_size": s} for s in SIZES}
-        # the disks of `vcm` lose light at edges: small ones
-        small = {"integrator": unbiased, "kernel_size": 0.5}
-        common = {
-            "resolution": [128, 72],
-            "samples": samples,
-            "kernel": "fixed",
-            "light_paths": light_paths,
-        }
-
-        expected = means(scene, seeds, **common, **small)
-        for what, settings in kernels.items():
-            off = (
-                means(scene, seeds, **common, **settings) - expected
-            ) / expected.mean()
-            error = off.std(ddof=1) / seeds**0.5
-            row = {
-                "scene": name,
-                "against": unbiased,
-                "method": what,
-                "off": off.mean(),
-                "error": error,
-            }
-            print(json.dumps(row), flush=True)
+        common = {"resolution": [128, 72], "samples": samples}
+        common |= {"light_paths": light_paths}
+        print_offsets(name, scene, unbiased, tries, seeds, **common)
 
 
 def units(seeds: int = 6) -> None:
-    """Means of one light over a wall each, with a fixed kernel of a quarter of a pixel, as JSON lines."""
+    """Means of one light over a wall each, with a fixed kernel of a quarter of a pixel, beside an unbiased method."""
+    tries = {what: {"kernel_size": SIZES[-1], **with_} for what, with_ in SETS.items()}
     for name, unbiased in UNITS.items():
         scene = usd.load(SHARED / "usd" / f"{name}.usda").scene
-        common = {"resolution": [64, 64], "samples": 64, "kernel": "fixed"}
-        small = {"integrator": unbiased, "kernel_size": 0.5}
-        expected = means(scene, seeds, **common, **small)
-        for what, techniques in SETS.items():
-            got = means(
-                scene, seeds, **common, **{"kernel_size": SIZES[-1], **techniques}
-            )
-            off = (got - expected) / expected.mean()
-            row = {"scene": name, "against": unbiased, "techniques": what}
-            row |= {"off": off.mean(), "error": off.std(ddof=1) / seeds**0.5}
-            print(json.dumps(row), flush=True)
+        common = {"resolution": [64, 64], "samples": 64}
+        print_offsets(name, scene, unbiased, tries, seeds, **common)
 
 
 def plot() -> None:
