@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// A rectangle of pixels; `x` grows to the right and `y` downwards from the film's top left corner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Rect {
     /// First column.
     pub x: u32,

@@ -177,6 +177,9 @@ pub trait Integrator: Send {
 
     /// Whether an iteration that is cut short leaves nothing in the film, or but a few bands of it.
     fn is_all_or_nothing(&self) -> bool;
+
+    /// Called when a render pauses: gives back the memory that only an iteration needs, and keeps what was learnt.
+    fn rest(&mut self);
 }
 
 /// Adds light that was scattered `bounces` times on its way to the camera.

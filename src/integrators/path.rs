@@ -40,6 +40,8 @@ impl Integrator for Path {
     fn is_all_or_nothing(&self) -> bool {
         false
     }
+
+    fn rest(&mut self) {}
 }
 
 /// Returns whether all its pixels were sampled.

@@ -4,8 +4,9 @@ use super::shown::Shown;
 use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::{Pass, Rect, Sample, SplatBuffer};
 use crate::math::sampler::hash;
-use crate::math::{LUMINANCE, Sampler};
+use crate::math::{LUMINANCE, Sampler, luminance};
 use crate::shading::World;
+use crate::transport::adaptation::{Adaptation, Look};
 use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
@@ -18,6 +19,7 @@ use crate::transport::store::{CameraStore, LightStore};
 use crate::transport::weigh::{Sampled, Weights};
 use crate::transport::{Cut, Estimator, Techniques};
 use glam::Vec3;
+use std::mem::take;
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -29,6 +31,8 @@ const LIGHT_PATHS_PER_PIXEL: u64 = 4;
 const LIGHT_STREAM: u32 = 0x11e4_7000;
 /// Keeps those of the grids apart from both.
 const GRID_STREAM: u32 = 0x961d_0000;
+/// Keeps those of the grids that choose sizes apart.
+const ADAPTATION_STREAM: u32 = 0xada9_0000;
 /// Keeps those of bridges apart.
 const BRIDGE_STREAM: u32 = 0xb21d_9e00;
 
@@ -63,6 +67,8 @@ pub struct Segment {
     octaves: Vec<f32>,
     /// First arrival of every camera path that has one.
     starts: Vec<u32>,
+    /// The kernel's size place by place.
+    adaptation: Adaptation,
     /// How many light paths pay.
     economy: Economy,
     /// For every band, the picture before the last iteration that looked whether they do.
@@ -87,6 +93,16 @@ impl Integrator for Segment {
 
     fn is_all_or_nothing(&self) -> bool {
         true
+    }
+
+    fn rest(&mut self) {
+        *self = Self {
+            guiding: take(&mut self.guiding),
+            adaptation: take(&mut self.adaptation),
+            economy: take(&mut self.economy),
+            yardsticks: take(&mut self.yardsticks),
+            ..Self::new(self.techniques)
+        };
     }
 }
 
@@ -127,6 +143,10 @@ impl Segment {
             self.yardsticks.clear();
         }
         let mut deviation = 0.0;
+        let adapts = self.techniques.kernel.adapts();
+        if adapts {
+            self.adaptation.begin(context.crop);
+        }
         for (k, band) in bands.into_iter().enumerate() {
             let crop = Rect { x: context.crop.x + band.x, y: context.crop.y + band.y, ..band };
             let of_band = Context { crop, ..*context };
@@ -136,6 +156,10 @@ impl Segment {
             let before = if compares { Shown::of(context.film, band) } else { None };
             self.gather(&of_band, band);
             costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
+            if adapts {
+                self.adapt(&of_band, cut);
+                costs.stage("adaptation", self.adaptation.bytes());
+            }
             let after = if lessons.guides || compares { Shown::of(context.film, band) } else { None };
             let Some(after) = after else { continue };
             if let Some(before) = before {
@@ -149,6 +173,12 @@ impl Segment {
                 let bytes = self.learn(&of_band, &after, &lessons, cut);
                 costs.stage("learning", bytes);
             }
+        }
+        if adapts {
+            let done = context.completed + 1;
+            let [nominal, next] = [done - 1, done].map(|i| self.techniques.kernel.edge(i));
+            self.adaptation.end_iteration(nominal, next, done);
+            costs.stage("adaptation", 0);
         }
         if lessons.guides {
             self.guiding.finish_iteration(context.world, cut);
@@ -199,7 +229,8 @@ impl Segment {
         costs.stage("sampling", self.samples.camera.bytes() + self.samples.light.bytes());
 
         let edge = self.techniques.kernel.edge(context.completed);
-        let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index));
+        let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index))
+            .with_sizes(self.adaptation.sizes());
         let all = Numbered { camera: &self.samples.camera.arrivals, light: &self.samples.light.arrivals };
         // bridges may begin at any light arrival; the other estimators follow light paths to their ends
         let needs_all = context.keep_all
@@ -363,6 +394,24 @@ impl Segment {
             self.economy.look(outcome, lessons.light_paths, lessons.bands, cut);
         }
         if lessons.guides { self.guiding.learn(outcome, cut) } else { 0 }
+    }
+
+    /// Takes note of what a band shows, from which the kernel's sizes follow.
+    fn adapt(&mut self, context: &Context, cut: &Cut) {
+        let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
+        let light = |p: &Primary| {
+            let reflected = p.arrival.map(|a| self.reflected.towards_camera(sampled, a as usize));
+            luminance(reflected.unwrap_or(Vec3::ZERO)) / p.albedo
+        };
+        let look = Look {
+            band: context.crop,
+            sensor: context.sensor,
+            primaries: &self.primaries,
+            arrivals: &self.samples.camera.arrivals,
+            seed: hash(context.seed ^ ADAPTATION_STREAM, context.completed),
+            completed: context.completed + 1,
+        };
+        self.adaptation.add(&look, light, cut);
     }
 
     /// Segments of this band.

@@ -81,6 +81,7 @@ pub struct Session {
     stop: StopSign,
     cancelled: AtomicBool,
     state: Mutex<State>,
+    integrator: Mutex<Box<dyn Integrator>>,
 }
 
 /// What changes from iteration to iteration.
@@ -111,6 +112,26 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// The method that the settings name.
+fn integrator(settings: &Settings) -> Box<dyn Integrator> {
+    let techniques = settings.techniques;
+    let Techniques { kernel, light_paths, .. } = techniques;
+    match settings.method {
+        Method::Path => Box::new(Path),
+        Method::Segment | Method::SegmentBridge => Box::new(Segment::new(techniques)),
+        Method::Mvf => Box::new(Segment::new(Techniques { light_paths: 0.0, ..techniques })),
+        Method::PhotonFilter => Box::new(Segment::new(Techniques { camera_paths: false, ..techniques })),
+        Method::SegmentPath => {
+            Box::new(Segment::new(Techniques { estimator: Estimator::WholePath, ..techniques }))
+        }
+        Method::Light => Box::new(Vertices::light_tracing(light_paths)),
+        Method::Bdpt => Box::new(Vertices::bidirectional(light_paths)),
+        Method::Ppm => Box::new(Vertices::photon_mapping(kernel, light_paths)),
+        Method::Bpm => Box::new(Vertices::bidirectional_photon_mapping(kernel, light_paths)),
+        Method::Vcm => Box::new(Vertices::connection_and_merging(kernel, light_paths)),
+    }
+}
+
 impl Session {
     /// Builds what rendering the scene needs.
     pub fn new(scene: Scene, settings: Settings) -> Result<Self, SessionError> {
@@ -127,6 +148,7 @@ impl Session {
         let bytes = Film::memory_bytes(film.width(), film.height(), settings.passes);
         build.insert("film".into(), Stage { seconds: 0.0, bytes });
         Ok(Self {
+            integrator: Mutex::new(integrator(&settings)),
             sensor,
             film,
             pool,
@@ -172,24 +194,9 @@ impl Session {
     }
 
     /// Renders until a limit is reached or it is cancelled. Run again, it starts from where it stopped,
-    /// with its time limit anew.
+    /// with its time limit anew and with what it had learnt.
     pub fn run(&self, events: &mut dyn Events) -> Result<StopReason, SessionError> {
-        let techniques = self.settings.techniques;
-        let Techniques { kernel, light_paths, .. } = techniques;
-        let mut integrator: Box<dyn Integrator> = match self.settings.method {
-            Method::Path => Box::new(Path),
-            Method::Segment | Method::SegmentBridge => Box::new(Segment::new(techniques)),
-            Method::Mvf => Box::new(Segment::new(Techniques { light_paths: 0.0, ..techniques })),
-            Method::PhotonFilter => Box::new(Segment::new(Techniques { camera_paths: false, ..techniques })),
-            Method::SegmentPath => {
-                Box::new(Segment::new(Techniques { estimator: Estimator::WholePath, ..techniques }))
-            }
-            Method::Light => Box::new(Vertices::light_tracing(light_paths)),
-            Method::Bdpt => Box::new(Vertices::bidirectional(light_paths)),
-            Method::Ppm => Box::new(Vertices::photon_mapping(kernel, light_paths)),
-            Method::Bpm => Box::new(Vertices::bidirectional_photon_mapping(kernel, light_paths)),
-            Method::Vcm => Box::new(Vertices::connection_and_merging(kernel, light_paths)),
-        };
+        let mut integrator = locked(&self.integrator);
         locked(&self.state).stop_reason = StopReason::Running;
         let watch = Stopwatch::start();
         let (before, cpu_before) = {
@@ -198,11 +205,12 @@ impl Session {
         };
         let announcements = Announcements::new(self.film.rect());
         let ends_early = !integrator.is_all_or_nothing();
+        let method = &mut **integrator;
         let (done, finished) = channel();
         let reason = std::thread::scope(|scope| {
             let worker = scope.spawn(|| {
                 let tile_done = |rect: Rect| announcements.add(rect);
-                let reason = self.iterate(&mut *integrator, &tile_done, &watch, (before, cpu_before));
+                let reason = self.iterate(method, &tile_done, &watch, (before, cpu_before));
                 // nobody listens any more only if the listener panicked
                 let _ = done.send(());
                 reason
@@ -229,7 +237,12 @@ impl Session {
         });
         self.stop.lower();
         let cancelled = self.cancelled.swap(false, Relaxed);
-        let reason = reason.map_err(|panic| SessionError::Panic(panic_text(&*panic)))?;
+        let reason = reason.map_err(|panic| {
+            // it may have been left half-done
+            *integrator = self::integrator(&self.settings);
+            SessionError::Panic(panic_text(&*panic))
+        })?;
+        integrator.rest();
         let reason = if cancelled { StopReason::Cancelled } else { reason };
         let mut state = locked(&self.state);
         state.stop_reason = reason;
@@ -439,3 +452,6 @@ impl Announcements {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -46,8 +46,9 @@ impl Method {
 #[serde(rename_all = "kebab-case")]
 enum KernelName {
     Fixed,
-    #[default]
     Progressive,
+    #[default]
+    Adaptive,
 }
 
 /// How the light segments of the segment method are used.
@@ -196,6 +197,7 @@ impl Json {
                 shrinking: match self.kernel {
                     KernelName::Fixed => Shrinking::Fixed,
                     KernelName::Progressive => Shrinking::Progressive { alpha },
+                    KernelName::Adaptive => Shrinking::Adaptive { alpha },
                 },
             },
             light_paths: within("light_paths", self.light_paths, 0.0, 64.0)?,

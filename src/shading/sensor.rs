@@ -115,8 +115,7 @@ impl Sensor {
                 (slope, origin, origin - lens)
             }
         };
-        let [x0, x1, y0, y1] = c.window;
-        let film = (window - Vec2::new(x0, y1)) / Vec2::new(x1 - x0, y0 - y1) * self.resolution;
+        let film = self.on_film(window);
         let forward = (self.rotation * slope.extend(-1.0)).normalize();
         let ray =
             CameraRay { origin: self.rotation * origin.extend(0.0), direction: forward, range: c.clipping };
@@ -124,6 +123,24 @@ impl Sensor {
         let density = self.density(&ray, p);
         let sound = density > 0.0 && density.is_finite() && film.is_finite() && end.is_finite();
         sound.then_some(SensorView { film, direction: -forward, end, density })
+    }
+
+    /// Where the middle of the lens sees a scene point, in pixels from the top left corner of the full film; `None` behind
+    /// the camera. It may lie outside the picture.
+    pub fn film_position(&self, p: Vec3) -> Option<Vec2> {
+        let at = self.rotation.transpose() * p;
+        let window = match self.camera.projection {
+            Projection::Perspective if at.z < 0.0 => at.truncate() / -at.z,
+            Projection::Perspective => return None,
+            Projection::Orthographic => at.truncate(),
+        };
+        Some(self.on_film(window))
+    }
+
+    /// The position on the full film of a point of the window.
+    fn on_film(&self, window: Vec2) -> Vec2 {
+        let [x0, x1, y0, y1] = self.camera.window;
+        (window - Vec2::new(x0, y1)) / Vec2::new(x1 - x0, y0 - y1) * self.resolution
     }
 
     /// Area of a pixel in the window's units.
@@ -252,6 +269,9 @@ mod tests {
                 assert!((view.direction + ray.direction).length() < 1e-5);
                 assert!((view.end - ray.origin - ray.direction * ray.range[0]).length() < 1e-4);
                 approx::assert_relative_eq!(view.density, s.density(&ray, p), max_relative = 1e-4);
+                // in focus it is seen there through the middle of the lens, too
+                let p = ray.origin + ray.direction * (s.camera.focus_distance / s.depth(ray.direction));
+                assert!((s.film_position(p).unwrap() - film).length() < 1e-3, "{json}");
             }
             assert!(s.view(s.rotation.z_axis * 3.0, Vec2::ZERO).is_none(), "behind the camera");
         }

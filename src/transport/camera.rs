@@ -5,8 +5,8 @@ use super::own_path::OwnPath;
 use super::store::{CameraStore, EmissionHit, NextEvent, Outgoing};
 use super::walk::{Chain, End, Follow, Witness};
 use crate::film::FirstHit;
-use crate::math::Sampler;
 use crate::math::density::ProjectedPdf;
+use crate::math::{Sampler, luminance};
 use crate::shading::bsdf::{Sight, Walk};
 use crate::shading::emitters::{EmissionGuide, Receiver};
 use crate::shading::{CameraRay, LightPoint, Piece, Sensor, SurfaceClass, SurfacePoint, Vertex, World};
@@ -22,6 +22,8 @@ pub struct Primary {
     pub arrival: Option<u32>,
     /// Factor on the basic radiance that is reflected there: throughput over choice probabilities.
     pub weight: Vec3,
+    /// Luminance of the albedo there, of what is continuous.
+    pub albedo: f32,
     /// Dirac lobes that it passes.
     pub passages: u32,
     /// Density per area with which primary segments arrive there, times `c`.
@@ -41,9 +43,10 @@ pub struct Primary {
 }
 
 impl Primary {
-    const NOTHING: Self = Self {
+    pub(super) const NOTHING: Self = Self {
         arrival: None,
         weight: Vec3::ZERO,
+        albedo: 0.0,
         passages: 0,
         density: 0.0,
         unfiltered: Vec3::ZERO,
@@ -205,6 +208,9 @@ impl CameraSampler<'_> {
         loop {
             let index = store.arrivals.len();
             let sight = end.sight();
+            if index == first {
+                primary.albedo = luminance(sight.as_ref().map_or(Vec3::ZERO, Sight::continuous_albedo));
+            }
             let mut arrived = arrival(self.world, &end, sight.as_ref());
             if !self.goes_on {
                 arrived.survival = 0.0;

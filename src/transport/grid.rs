@@ -4,6 +4,7 @@
 //! camera, so that it is a function of the place alone. Offsets, the orientation of the normals' bins and
 //! the distances at which the edge doubles are drawn anew in every iteration: no pattern stays.
 
+use super::sizes::Sizes;
 use super::store::Arrival;
 use crate::math::sampler::{hash, hash_unit};
 use crate::shading::{Sensor, SurfaceClass};
@@ -20,6 +21,7 @@ const MAX_LEVEL: i32 = 100;
 pub struct Grid<'a> {
     sensor: &'a Sensor,
     edge: f32,
+    sizes: Option<&'a Sizes>,
     offset: Vec3,
     level_jitter: f32,
     turn: Mat3,
@@ -42,10 +44,22 @@ impl<'a> Grid<'a> {
         Self {
             sensor,
             edge,
+            sizes: None,
             offset: Vec3::new(u(0), u(1), u(2)),
             level_jitter: u(3),
             turn: Mat3::from_quat(Quat::from_xyzw(a * s1, a * c1, b * s2, b * c2).normalize()),
         }
+    }
+
+    /// The same, larger or smaller place by place.
+    pub fn with_sizes(self, sizes: &'a Sizes) -> Self {
+        Self { sizes: (!sizes.is_empty()).then_some(sizes), ..self }
+    }
+
+    /// Logarithm, in octaves, of the kernel's edge at a point.
+    fn nominal(&self, p: Vec3) -> f32 {
+        let octaves = |s: &Sizes| self.sensor.film_position(p).map_or(0.0, |film| s.octaves(film));
+        (self.edge * self.sensor.pixel_footprint(p)).log2() + self.sizes.map_or(0.0, octaves)
     }
 
     /// The voxel of a point. On average over the jitter the logarithm of its edge is that of the kernel.
@@ -61,14 +75,14 @@ impl<'a> Grid<'a> {
     }
 
     fn level(&self, p: Vec3) -> i32 {
-        let size = (self.edge * self.sensor.pixel_footprint(p)).log2() + self.level_jitter;
+        let size = self.nominal(p) + self.level_jitter;
         // a conversion of NaN or an infinity saturates
         (size.floor() as i32).clamp(-MAX_LEVEL, MAX_LEVEL)
     }
 
     /// Logarithm, in octaves, of the edge of the voxel at a point over the kernel's: zero on average over the jitter.
     pub fn octaves(&self, p: Vec3) -> f32 {
-        self.level(p) as f32 - (self.edge * self.sensor.pixel_footprint(p)).log2()
+        self.level(p) as f32 - self.nominal(p)
     }
 
     /// Lower corner and edge of a voxel.
@@ -107,6 +121,7 @@ fn key(voxel: &Voxel, bin: u32, class: SurfaceClass) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Rect;
     use crate::math::warp;
     use crate::scene::Camera;
 
@@ -146,6 +161,31 @@ mod tests {
             .sum::<f32>()
             / 4000.0;
         assert!((mean - 3f32.log2()).abs() < 0.03, "{mean}");
+    }
+
+    #[test]
+    fn edges_are_larger_and_smaller_place_by_place() {
+        let sensor = sensor();
+        let sizes =
+            Sizes::new(Rect::new(0, 0, 100, 100), (0..49).map(|block| (block % 7) as f32 - 3.0).collect());
+        // seen in the middle of the second column of blocks, behind the camera, and far beside the picture
+        for (p, octaves) in [
+            (Vec3::new(-0.52, 0.1, -1.0) * 3.0, -2.0),
+            (Vec3::new(0.2, 0.1, 3.0), 0.0),
+            (Vec3::new(9.0, 0.0, -1.0), 0.0),
+        ] {
+            let logarithm = |seed| {
+                let grid = Grid::new(&sensor, 3.0, seed).with_sizes(&sizes);
+                let voxel = grid.voxel(p);
+                assert!(grid.has_level_of(p, &voxel));
+                let edge = (grid.place(&voxel).1 / sensor.pixel_footprint(p)).log2();
+                // what is told of the voxel is relative to the kernel there
+                assert!((edge - 3f32.log2() - octaves - grid.octaves(p)).abs() < 1e-4);
+                edge
+            };
+            let mean = (0..4000).map(logarithm).sum::<f32>() / 4000.0;
+            assert!((mean - 3f32.log2() - octaves).abs() < 0.03, "{mean} at {p}");
+        }
     }
 
     #[test]

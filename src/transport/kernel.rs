@@ -11,6 +11,11 @@ pub enum Shrinking {
         /// In (0,1): near one it shrinks slowly.
         alpha: f32,
     },
+    /// The same, but larger or smaller place by place, as blur and noise ask for.
+    Adaptive {
+        /// As above.
+        alpha: f32,
+    },
 }
 
 /// The kernel: a voxel as large as some pixels where it is.
@@ -27,16 +32,21 @@ pub const DEFAULT_ALPHA: f32 = 0.67;
 
 impl Default for Kernel {
     fn default() -> Self {
-        Self { start: 4.0, shrinking: Shrinking::Progressive { alpha: DEFAULT_ALPHA } }
+        Self { start: 4.0, shrinking: Shrinking::Adaptive { alpha: DEFAULT_ALPHA } }
     }
 }
 
 impl Kernel {
+    /// Whether its size is chosen place by place.
+    pub fn adapts(&self) -> bool {
+        matches!(self.shrinking, Shrinking::Adaptive { .. })
+    }
+
     /// Edge of the voxels after `iterations` iterations, in pixels.
     pub fn edge(&self, iterations: u32) -> f32 {
         match self.shrinking {
             Shrinking::Fixed => self.start,
-            Shrinking::Progressive { alpha } => {
+            Shrinking::Progressive { alpha } | Shrinking::Adaptive { alpha } => {
                 let factor = |i: u32| ((f64::from(i) + f64::from(alpha)) / (f64::from(i) + 1.0)).ln();
                 let log_area: f64 = (1..=iterations).map(factor).sum();
                 self.start * (0.5 * log_area).exp() as f32

@@ -1,6 +1,7 @@
 //! Segment-based light transport (Wang, West and Hachisuka 2025), after its Algorithm 1: sample, cluster, weigh,
 //! propagate, gather. `docs/method.md` tells the method in one piece.
 
+pub mod adaptation;
 pub mod area;
 pub mod arrival;
 pub mod bridge;
@@ -18,6 +19,7 @@ mod own_path;
 mod photons;
 pub mod propagate;
 pub mod report;
+pub mod sizes;
 pub mod store;
 #[cfg(test)]
 mod testing;

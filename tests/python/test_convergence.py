@@ -67,6 +67,8 @@ def test_difference_of_means_of_black():
 def test_methods_are_settings():
     assert methods.settings_of("segment") == {"integrator": "segment"}
     assert methods.settings_of("segment-fixed") == {"integrator": "segment", "kernel": "fixed"}
+    progressive = methods.settings_of("segment-progressive")
+    assert progressive == {"integrator": "segment", "kernel": "progressive"}
     assert methods.settings_of("vcm") == {"integrator": "vcm"}
 
 

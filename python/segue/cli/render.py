@@ -54,8 +54,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     add(
         "--kernel",
-        choices=("progressive", "fixed"),
-        help="whether the kernel shrinks (default) or stays, for methods that have one",
+        choices=("adaptive", "progressive", "fixed"),
+        help="whether the kernel shrinks or stays, for methods that have one; the segment method "
+        "also makes it larger or smaller place by place (adaptive, the default)",
     )
     add(
         "--kernel-size",

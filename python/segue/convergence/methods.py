@@ -6,6 +6,7 @@ from typing import Any
 
 #: Names that are more than an integrator's.
 VARIANTS: dict[str, dict[str, Any]] = {
+    "segment-progressive": {"integrator": "segment", "kernel": "progressive"},
     "segment-fixed": {"integrator": "segment", "kernel": "fixed"},
     "segment-bridge-power": {"integrator": "segment-bridge", "bridges": "power"},
     "segment-literal": {"integrator": "segment", "estimator": "literal"},

@@ -148,6 +148,10 @@ impl Integrator for Vertices {
     fn is_all_or_nothing(&self) -> bool {
         true
     }
+
+    fn rest(&mut self) {
+        *self = Self::new(self.techniques, self.kernel, self.light_paths);
+    }
 }
 
 impl Vertices {
