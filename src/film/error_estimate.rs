@@ -20,6 +20,11 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
+    /// The same where something else tells a systematic error, too: the larger counts.
+    pub fn or_bias(self, other: Option<f64>) -> Self {
+        Self { bias: [self.bias, other].into_iter().flatten().reduce(f64::max), ..self }
+    }
+
     /// Both parts.
     pub fn total(&self) -> f64 {
         self.noise + self.bias.unwrap_or(0.0)

@@ -245,6 +245,8 @@ mod tests {
         assert_eq!(film.estimated_error(), None);
         film.add_iteration(|_, _| Sample::default());
         assert_eq!(film.estimated_error(), NONE);
+        let biased = NONE.map(|e| e.or_bias(Some(0.5)).or_bias(None).or_bias(Some(0.25)));
+        assert_eq!(biased.map(|e| (e.bias, e.total())), Some((Some(0.5), 0.5)));
         let one = Film::new(1, 1, PassSet::default()).unwrap();
         (0..2).for_each(|_| one.add_iteration(|_, _| Sample { radiance: Vec3::ONE, ..Default::default() }));
         assert_eq!(one.estimated_error(), NONE);

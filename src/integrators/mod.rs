@@ -49,6 +49,8 @@ pub struct Counters {
     pub segments: AtomicU64,
     /// What turned out not to pay and is left out, where an integrator looks.
     pub left_out: Mutex<Option<String>>,
+    /// Relative mean squared error by the kernel's blur, where an integrator knows it.
+    pub blur: Mutex<Option<f64>>,
     /// Contributions of segments that were not finite and were dropped.
     pub dropped: AtomicU64,
     /// The graph of the segment method, from the last iteration in which it was looked at (its last band).

@@ -178,6 +178,7 @@ impl Segment {
             let done = context.completed + 1;
             let [nominal, next] = [done - 1, done].map(|i| self.techniques.kernel.edge(i));
             self.adaptation.end_iteration(nominal, next, done);
+            *context.counters.blur.lock().unwrap_or_else(PoisonError::into_inner) = self.adaptation.blur();
             costs.stage("adaptation", 0);
         }
         if lessons.guides {

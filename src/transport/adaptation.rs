@@ -17,7 +17,7 @@ use crate::math::sampler::hash;
 use crate::shading::Sensor;
 use rayon::prelude::*;
 
-/// Sizes that are compared, octaves over one pixel.
+/// Sizes that are compared, octaves over one pixel: one after the other.
 const CANDIDATES: [f32; 5] = [0.0, 1.0, 2.0, 3.0, 4.0];
 /// The candidate whose voxels tell by what brightness differences are judged.
 const JUDGE: usize = 2;
@@ -47,6 +47,15 @@ struct Evidence {
 }
 
 impl Evidence {
+    /// Squared differences, counted as they are judged, that a kernel makes of so many octaves over a pixel.
+    fn blur_of(&self, octaves: f32) -> f64 {
+        let last = CANDIDATES.len() - 1;
+        let at = (octaves - CANDIDATES[0]).clamp(0.0, CANDIDATES[last]);
+        let below = (at as usize).min(last - 1);
+        let [low, high] = [self.blur[below], self.blur[below + 1]];
+        BLUR * (low + f64::from(at - CANDIDATES[below]) * (high - low))
+    }
+
     /// The candidate of least error for as many iterations as there were, over which the sum of the reciprocal squared
     /// sizes was `densities`; `None` where too little is known.
     fn best(&self, completed: u32, densities: f64) -> Option<f32> {
@@ -73,6 +82,7 @@ pub struct Adaptation {
     densities: Vec<f64>,
     evidence: Vec<Evidence>,
     sizes: Sizes,
+    blur: Option<f64>,
 }
 
 /// A band of the picture after an iteration.
@@ -104,6 +114,7 @@ impl Adaptation {
                 densities: vec![0.0; count],
                 evidence: vec![Evidence::default(); count],
                 sizes: Sizes::default(),
+                blur: None,
             };
         }
     }
@@ -111,6 +122,11 @@ impl Adaptation {
     /// The sizes now.
     pub fn sizes(&self) -> &Sizes {
         &self.sizes
+    }
+
+    /// Relative mean squared error that the kernels make by what they blur, as it was found when sizes were last chosen.
+    pub fn blur(&self) -> Option<f64> {
+        self.blur
     }
 
     /// Memory, bytes.
@@ -181,6 +197,9 @@ impl Adaptation {
         if !chooses(completed) {
             return;
         }
+        let made = self.evidence.iter().zip(&self.octaves).map(|(e, o)| e.blur_of(nominal.log2() + o));
+        let pixels = self.evidence.iter().map(|e| e.pixels).sum::<f64>();
+        self.blur = (pixels > 0.0).then(|| made.sum::<f64>().max(0.0) / pixels).filter(|b| b.is_finite());
         // never below a pixel for its own sake: the pixel filter blurs as much
         let least = (-next.log2()).min(0.0);
         for ((evidence, density), octaves) in

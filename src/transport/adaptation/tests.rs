@@ -34,9 +34,9 @@ fn wall(sensor: &Sensor, depth: impl Fn(u32, u32) -> f32) -> (Vec<Primary>, Vec<
     ((0..SIDE * SIDE).map(seen).collect(), PICTURE.pixels().map(arrival).collect())
 }
 
-/// Sizes in pixels, block by block, after iterations that show `light(x, y)` under noise of this width, whose share of
+/// What is found in iterations that show `light(x, y)` under noise of this width, whose share of
 /// the light is alike within 4 x 4 pixels as a kernel makes it.
-fn sizes(light: impl Fn(u32, u32) -> f32, noise: f32, depth: impl Fn(u32, u32) -> f32) -> Vec<f32> {
+fn adapted(light: impl Fn(u32, u32) -> f32, noise: f32, depth: impl Fn(u32, u32) -> f32) -> Adaptation {
     let sensor = sensor();
     let (mut primaries, arrivals) = wall(&sensor, depth);
     let mut adaptation = Adaptation::default();
@@ -57,7 +57,12 @@ fn sizes(light: impl Fn(u32, u32) -> f32, noise: f32, depth: impl Fn(u32, u32) -
         adaptation.add(&look, |p| p.weight.x, &ON);
         adaptation.end_iteration(4.0, 4.0, completed);
     }
-    adaptation.octaves.iter().map(|o| 4.0 * o.exp2()).collect()
+    adaptation
+}
+
+/// Sizes in pixels, block by block.
+fn sizes(light: impl Fn(u32, u32) -> f32, noise: f32, depth: impl Fn(u32, u32) -> f32) -> Vec<f32> {
+    adapted(light, noise, depth).octaves.iter().map(|o| 4.0 * o.exp2()).collect()
 }
 
 /// Mean over some blocks, octaves over a pixel.
@@ -86,6 +91,22 @@ fn kernels_are_small_where_light_is_fine_and_as_small_as_noise_allows() {
     let (fine, coarse) = (mean(&calm, 0..2), mean(&loud, 0..2));
     assert!(fine < 1.0 && coarse > fine + 0.5, "{fine} {coarse}");
     assert!(mean(&calm, 4..6) > 3.5 && mean(&loud, 4..6) > 3.0);
+}
+
+#[test]
+fn what_kernels_blur_is_told() {
+    // stripes of a tenth of the mean, finer than any kernel but the smallest, so calm that none blurs them in the end
+    let striped = |x: u32, y: u32| if ((2 * x + y) / 8).is_multiple_of(2) { 0.9 } else { 1.1 };
+    let [even, calm, loud] = [
+        adapted(|_, _| 1.0, 1.0, |_, _| 5.0),
+        adapted(striped, 0.1, |_, _| 5.0),
+        adapted(striped, 4.0, |_, _| 5.0),
+    ]
+    .map(|a| a.blur().unwrap());
+    // squared: 0.01, which counts BLUR times where kernels join the stripes
+    assert!(even < 1e-3 && calm < 3e-3, "{even} {calm}");
+    assert!((1e-2..5e-2).contains(&loud), "{loud}");
+    assert_eq!(Adaptation::default().blur(), None);
 }
 
 #[test]
