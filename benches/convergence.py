@@ -22,9 +22,7 @@ from segue import Render, images, usd
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared"))
 REPORTS = ROOT / "docs" / "convergence"
-METHODS = (
-    "segment,segment-progressive,segment-fixed,mvf,photon-filter,bpm,vcm,path"
-)
+METHODS = "segment,segment-progressive,segment-fixed,mvf,photon-filter,bpm,vcm,path"
 #: Names in the shared scenes, resolutions, and seconds of one thread for a reference.
 INTERIORS = {
     "bathroom": ("bathroom", (180, 120), 900.0),
