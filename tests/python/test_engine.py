@@ -256,6 +256,8 @@ sys.path[:0] = sys.argv[1:3]
 import segue
 from test_engine import endless, lit_scene
 render = segue.Render(lit_scene(), endless())
+# a test that runs in the background of a shell inherits an ignored signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
     render.run()
