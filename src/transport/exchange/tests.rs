@@ -1,6 +1,7 @@
 //! The weights of all techniques that could have made a segment sum to one.
 
 use super::*;
+use crate::math::sampler::{hash, hash_unit};
 use crate::math::{Sampler, warp};
 use crate::shading::bsdf::Walk;
 use crate::shading::{CameraRay, Piece, World};
@@ -115,4 +116,39 @@ fn the_weights_of_all_techniques_sum_to_one() {
         }
         assert!(checked > 500 && through_glass > 50 && shared > 100, "{checked} {through_glass} {shared}");
     }
+}
+
+/// A diffuse cluster of ten million segments, which differ by ten orders of magnitude in what they bring.
+#[test]
+fn sums_over_ten_million_segments_are_as_good_as_in_double_precision() {
+    const COUNT: u32 = 10_000_000;
+    let world = room(r#"{"surface":{"type":"diffuse","color":0.6}}"#);
+    let (one, light) = (both_ways(&world, 1).0, LightStore::default());
+    let of = |k: u32, n: u32| hash_unit(hash(k, n), 3);
+    let arrivals = (0..COUNT).map(|k| Arrival { survival: of(k, 1), ..one.arrivals[0] });
+    let outgoing = (0..COUNT).map(|k| Outgoing { pdf: of(k, 2), ..one.outgoing[0] });
+    let camera = CameraStore {
+        arrivals: arrivals.collect(),
+        inverse_n2: vec![1.0; COUNT as usize],
+        outgoing: outgoing.collect(),
+        next_events: vec![NextEvent::default(); COUNT as usize],
+        ..CameraStore::default()
+    };
+    let values: Vec<Vec3> = (0..COUNT).map(|k| Vec3::new(1.0, of(k, 3), 1e10f32.powf(of(k, 4)))).collect();
+    let (clusters, mut weights) = (clustered(&world, &camera, &light, Areas::None), Weights::default());
+    let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
+    assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
+    let cluster = s.cluster_of(0);
+    assert_eq!(cluster.cameras, COUNT);
+
+    let exact: DVec3 =
+        values.iter().zip(&camera.outgoing).map(|(v, out)| v.as_dvec3() * f64::from(out.pdf)).sum();
+    let expected = camera.arrivals[0].reflectance.as_dvec3() * exact / f64::from(cluster.area);
+    let got = gather(s, &weights, &values, &ON)[0].as_dvec3();
+    assert!((got / expected - 1.0).abs().max_element() < 1e-5, "{got}, not {expected}");
+
+    let choices: f64 = camera.arrivals.iter().map(|a| f64::from(a.survival)).sum();
+    let expected = choices * f64::from(camera.outgoing[0].pdf);
+    let got = f64::from(weights.densities[clusters.place[0] as usize].camera);
+    assert!((got / expected - 1.0).abs() < 1e-5, "{got}, not {expected}");
 }
