@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// The stop sign of a render: set from any thread, looked at by the workers between small pieces of work.
@@ -59,6 +59,11 @@ pub struct Counters {
     pub stages: Mutex<BTreeMap<&'static str, (f64, u64)>>,
 }
 
+/// What is behind a lock, also after a thread panicked with it: figures, whole at any time, or what is then made anew.
+pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Adds up what the stages of an iteration cost, one after the other.
 pub struct StageCosts<'a> {
     counters: &'a Counters,
@@ -76,8 +81,7 @@ impl<'a> StageCosts<'a> {
         let now = Instant::now();
         let seconds = now.duration_since(self.since).as_secs_f64();
         self.since = now;
-        // only numbers are behind the lock, whole at any time
-        let mut stages = self.counters.stages.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut stages = locked(&self.counters.stages);
         let stage = stages.entry(name).or_default();
         stage.0 += seconds;
         stage.1 = stage.1.max(bytes as u64);

@@ -1,7 +1,7 @@
 //! Segment-based light transport: the whole method, iteration by iteration.
 
 use super::shown::Shown;
-use super::{Context, Integrator, IterationEnd, StageCosts};
+use super::{Context, Integrator, IterationEnd, StageCosts, locked};
 use crate::film::{Pass, Rect, Sample, SplatBuffer};
 use crate::math::sampler::hash;
 use crate::math::{LUMINANCE, Sampler, luminance};
@@ -20,7 +20,6 @@ use crate::transport::weigh::{Sampled, Weights};
 use crate::transport::{Cut, Estimator, Techniques};
 use glam::Vec3;
 use std::mem::take;
-use std::sync::PoisonError;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// What the segments of a camera path take until they are in the film, about, bytes.
@@ -178,7 +177,7 @@ impl Segment {
             let done = context.completed + 1;
             let [nominal, next] = [done - 1, done].map(|i| self.techniques.kernel.edge(i));
             self.adaptation.end_iteration(nominal, next, done);
-            *context.counters.blur.lock().unwrap_or_else(PoisonError::into_inner) = self.adaptation.blur();
+            *locked(&context.counters.blur) = self.adaptation.blur();
             costs.stage("adaptation", 0);
         }
         if lessons.guides {
@@ -189,7 +188,7 @@ impl Segment {
             let departure = Departure { deviation, before: context.completed };
             self.economy.judge(index, departure, context.world.has_hidden_light());
             let left_out = self.economy.left_out();
-            *context.counters.left_out.lock().unwrap_or_else(PoisonError::into_inner) = left_out;
+            *locked(&context.counters.left_out) = left_out;
         }
         true
     }
@@ -299,7 +298,7 @@ impl Segment {
         // figures that hardly change are taken ever more rarely
         if solved && (index + 1).is_power_of_two() {
             let report = self.reflected.report(sampled, &self.weights, cut);
-            *context.counters.graph.lock().unwrap_or_else(PoisonError::into_inner) = Some(report);
+            *locked(&context.counters.graph) = Some(report);
             costs.stage("report", 0);
         }
         solved

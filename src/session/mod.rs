@@ -9,7 +9,7 @@ use crate::film::{ErrorEstimate, Film, FilmError, Rect};
 use crate::integrators::path::Path;
 use crate::integrators::segment::Segment;
 use crate::integrators::vertices::Vertices;
-use crate::integrators::{Context, Counters, Integrator, IterationEnd, StopSign};
+use crate::integrators::{Context, Counters, Integrator, IterationEnd, StopSign, locked};
 use crate::scene::{Scene, SceneError};
 use crate::shading::{BuildCost, Sensor, World, WorldError};
 use crate::transport::{Estimator, Techniques};
@@ -20,7 +20,7 @@ use statistics::{CurvePoint, Stage, Statistics, StopReason};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Why a render could not be set up.
@@ -106,11 +106,6 @@ const CURVE_RATIO: f64 = 1.25;
 const POLL: Duration = Duration::from_millis(20);
 /// Side of the rectangles in which new content is announced, pixels.
 const ANNOUNCED: u32 = 256;
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // what a panicking thread left behind are whole numbers, still good to read
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// The method that the settings name.
 fn integrator(settings: &Settings) -> Box<dyn Integrator> {

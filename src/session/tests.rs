@@ -1,7 +1,7 @@
 use super::*;
 use crate::film::Pass;
-use crate::scene::mesh::MeshInput;
-use crate::scene::{InstanceGroup, SceneBuilder};
+use crate::scene::SceneBuilder;
+use crate::transport::testing::place;
 use glam::Vec3;
 
 struct Silent;
@@ -17,26 +17,13 @@ impl Events for Silent {
 /// A small lamp above a floor, and a pane of glass between them.
 fn session(samples: u32) -> Session {
     let mut b = SceneBuilder::default();
-    let mut place = |points: [[f32; 3]; 4], material: &str| {
-        let material = b.add_material("material", material).unwrap();
-        let points = points.map(Vec3::from);
-        let face_indices = &[0, 1, 2, 0, 2, 3];
-        let input = MeshInput { name: "mesh", points: &points, face_indices, ..Default::default() };
-        let group = InstanceGroup {
-            name: "object".into(),
-            mesh: b.add_mesh(&input).unwrap(),
-            materials: vec![material],
-            camera_visible: true,
-            two_sided_emission: true,
-            object_index: 0,
-        };
-        let identity: [f64; 16] = std::array::from_fn(|k| f64::from(u8::from(k % 5 == 0)));
-        b.add_instances(group, &[identity]).unwrap();
+    let mut square = |s: f32, z: f32, material: &str| {
+        let points = [[-s, -s, z], [s, -s, z], [s, s, z], [-s, s, z]].map(Vec3::from);
+        place(&mut b, &points, &[0, 1, 2, 0, 2, 3], material);
     };
-    let square = |s: f32, z: f32| [[-s, -s, z], [s, -s, z], [s, s, z], [-s, s, z]];
-    place(square(4.0, -4.0), r#"{"surface":{"type":"diffuse","color":[0.7,0.6,0.5]}}"#);
-    place(square(0.5, -2.5), r#"{"surface":{"type":"glass","ior":1.5}}"#);
-    place(square(0.1, -1.0), r#"{"surface":{"type":"emission","color":[9,8,7]}}"#);
+    square(4.0, -4.0, r#"{"surface":{"type":"diffuse","color":[0.7,0.6,0.5]}}"#);
+    square(0.5, -2.5, r#"{"surface":{"type":"glass","ior":1.5}}"#);
+    square(0.1, -1.0, r#"{"surface":{"type":"emission","color":[9,8,7]}}"#);
     b.set_camera("camera", r#"{"window":[-1,1,-1,1]}"#).unwrap();
     let settings = format!(r#"{{"resolution":[40,40],"samples":{samples},"light_paths":1}}"#);
     Session::new(b.build().unwrap(), Settings::from_json(&settings).unwrap()).unwrap()

@@ -22,7 +22,7 @@ pub mod report;
 pub mod sizes;
 pub mod store;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod unseen;
 pub mod walk;
 pub mod weigh;

@@ -15,32 +15,34 @@ const CAMERA: &str = r#"{"window":[-1,1,-1,1]}"#;
 /// Never stopped.
 pub const ON: Cut = Cut(&|| false);
 
+/// Adds a mesh of one material where its points are.
+pub fn place(b: &mut SceneBuilder, points: &[Vec3], faces: &[u32], material: &str) {
+    let identity: [f64; 16] = std::array::from_fn(|k| f64::from(u8::from(k % 5 == 0)));
+    let material = b.add_material("material", material).unwrap();
+    let input = MeshInput { name: "mesh", points, face_indices: faces, ..Default::default() };
+    let mesh = b.add_mesh(&input).unwrap();
+    let group = InstanceGroup {
+        name: "object".into(),
+        mesh,
+        materials: vec![material],
+        camera_visible: true,
+        two_sided_emission: true,
+        object_index: 0,
+    };
+    b.add_instances(group, &[identity]).unwrap();
+}
+
 /// A closed room of one material, with a pane of glass across it.
 pub fn room(wall: &str) -> World {
     let mut b = SceneBuilder::default();
-    let identity: [f64; 16] = std::array::from_fn(|k| f64::from(u8::from(k % 5 == 0)));
-    let mut place = |points: &[Vec3], faces: &[u32], material: &str| {
-        let material = b.add_material("material", material).unwrap();
-        let input = MeshInput { name: "mesh", points, face_indices: faces, ..Default::default() };
-        let mesh = b.add_mesh(&input).unwrap();
-        let group = InstanceGroup {
-            name: "object".into(),
-            mesh,
-            materials: vec![material],
-            camera_visible: true,
-            two_sided_emission: true,
-            object_index: 0,
-        };
-        b.add_instances(group, &[identity]).unwrap();
-    };
     let corner = |k: u32| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32) * 2.0 - 1.0;
     #[rustfmt::skip]
     let faces = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3];
     let cube: Vec<Vec3> = (0..8).map(corner).collect();
-    place(&cube, &faces, wall);
+    place(&mut b, &cube, &faces, wall);
     let pane: Vec<Vec3> = cube.iter().map(|p| *p * Vec3::new(0.8, 0.8, 0.05)).collect();
     let outwards: Vec<u32> = faces.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
-    place(&pane, &outwards, r#"{"surface":{"type":"glass","ior":1.5}}"#);
+    place(&mut b, &pane, &outwards, r#"{"surface":{"type":"glass","ior":1.5}}"#);
     b.set_camera("camera", CAMERA).unwrap();
     World::new(Arc::new(b.build().unwrap()), false).unwrap()
 }
