@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use segue::shading::lobes::energy::{FIXED_ONE, FIXED_ZERO, MAX_INDEX, MIN_RATIO, grid::*};
 use std::f64::consts::TAU;
 
-/// Points per incident direction, along each of two axes.
-const SIDE: usize = 96;
+/// Points per incident direction.
+const POINTS: usize = 1 << 14;
 
 fn node(k: usize, n: usize) -> f64 {
     k as f64 / (n - 1) as f64
@@ -114,12 +114,14 @@ impl Surface {
         (1.0 + l) / (1.0 + l + self.lambda(i))
     }
 
-    /// Normals visible from `o`, evenly weighted.
-    fn normals(self, o: DVec3) -> impl Iterator<Item = DVec3> {
-        (0..SIDE * SIDE).map(move |k| {
-            let u = DVec2::new((k / SIDE) as f64 + 0.5, (k % SIDE) as f64 + 0.5) / SIDE as f64;
-            // turned a little from row to row, against alignment with the axes
-            self.visible(o, DVec2::new(u.x, (u.y + 0.618_034 * u.x).fract()))
+    /// Normals visible from `o`, and their weights, which add up to one.
+    fn normals(self, o: DVec3) -> impl Iterator<Item = (DVec3, f64)> {
+        (0..POINTS).map(move |k| {
+            // A golden spiral: no two points share a radius, and most are near the rim. What a nearly smooth surface
+            // loses comes from a rim as thin as alpha squared.
+            let rest = 1.0 - (k as f64 + 0.5) / POINTS as f64;
+            let turns = (k as f64 * 0.5 * (5f64.sqrt() - 1.0)).fract();
+            (self.visible(o, DVec2::new(1.0 - rest * rest, turns)), 2.0 * rest / POINTS as f64)
         })
     }
 }
@@ -179,14 +181,13 @@ fn mean(g: Surface, f: impl Fn(f64) -> f64) -> f64 {
 /// Scale and single-scattering albedo of white isotropic reflection by elevation, and the albedo's mean.
 fn isotropic(a: f64) -> (Vec<f64>, Vec<f64>, f64) {
     let g = Surface { ax: a, ay: a };
-    let n = (SIDE * SIDE) as f64;
     let mut m = vec![vec![0.0; ELEVATION]; ELEVATION];
     for (j, row) in m.iter_mut().enumerate() {
         let o = g.direction(elevation(j, ELEVATION), 1.0);
-        for h in g.normals(o) {
+        for (h, share) in g.normals(o) {
             let i = 2.0 * o.dot(h) * h - o;
             if i.z > 0.0 {
-                spread(row, g.elevation(i), g.weight(o, i) / n);
+                spread(row, g.elevation(i), g.weight(o, i) * share);
             }
         }
     }
@@ -198,19 +199,18 @@ fn isotropic(a: f64) -> (Vec<f64>, Vec<f64>, f64) {
 /// Scale of white anisotropic reflection by azimuth and elevation.
 fn anisotropic(a: f64, ratio: f64) -> Vec<f64> {
     let g = Surface { ax: a / ratio.sqrt(), ay: a * ratio.sqrt() };
-    let n = (SIDE * SIDE) as f64;
     let size = ANISO_AZIMUTH * ANISO_ELEVATION;
     let mut m = vec![vec![0.0; size]; size];
     for (j, row) in m.iter_mut().enumerate() {
         let x = elevation(j % ANISO_ELEVATION, ANISO_ELEVATION);
         let o = g.direction(x, azimuth_cos2(j / ANISO_ELEVATION));
-        for h in g.normals(o) {
+        for (h, share) in g.normals(o) {
             let i = 2.0 * o.dot(h) * h - o;
             if i.z <= 0.0 {
                 continue;
             }
             let mut azimuth = [0.0; ANISO_AZIMUTH];
-            spread(&mut azimuth, g.azimuth(i), g.weight(o, i) / n);
+            spread(&mut azimuth, g.azimuth(i), g.weight(o, i) * share);
             for (c, w) in azimuth.into_iter().enumerate() {
                 if w > 0.0 {
                     spread(&mut row[c * ANISO_ELEVATION..][..ANISO_ELEVATION], g.elevation(i), w);
@@ -227,22 +227,22 @@ fn glass(a: f64, eta: f64) -> (Vec<f64>, f64) {
     let g = Surface { ax: a, ay: a };
     let loss = |o: DVec3| {
         let mut sum = 0.0;
-        for h in g.normals(o) {
+        for (h, share) in g.normals(o) {
             let c = o.dot(h);
             let f = fresnel(c, eta);
             let i = 2.0 * c * h - o;
             if i.z > 0.0 {
-                sum += f * g.weight(o, i);
+                sum += share * f * g.weight(o, i);
             }
             if f < 1.0 {
                 let t = (1.0 - (1.0 - c * c) / (eta * eta)).sqrt();
                 let i = (h * (c / eta - t) - o / eta).normalize();
                 if i.z < 0.0 {
-                    sum += (1.0 - f) * g.weight(o, i);
+                    sum += share * (1.0 - f) * g.weight(o, i);
                 }
             }
         }
-        (1.0 - sum / (SIDE * SIDE) as f64).max(0.0)
+        (1.0 - sum).max(0.0)
     };
     let at = |k| loss(g.direction(elevation(k, GLASS_ELEVATION), 1.0)).powf(0.25);
     let row: Vec<f64> = (0..GLASS_ELEVATION).map(at).collect();
@@ -260,11 +260,11 @@ fn layer(a: f64, eta: f64, scale: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let o = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu);
         let so = read(scale, g.elevation(o));
         let (mut once, mut more, mut f_once, mut f_more) = (0.0, 0.0, 0.0, 0.0);
-        for h in g.normals(o) {
+        for (h, share) in g.normals(o) {
             let c = o.dot(h);
             let i = 2.0 * c * h - o;
             if i.z > 0.0 {
-                let w = g.weight(o, i);
+                let w = share * g.weight(o, i);
                 let f = (fresnel(c, eta) - f0) / (1.0 - f0);
                 // never zero, so that the average has its limit where there is nothing to add
                 let added = w * ((so * read(scale, g.elevation(i)) - 1.0).max(0.0) + 1e-9);

@@ -108,6 +108,8 @@ pub struct Context<'a> {
     pub transparent_background: bool,
     /// Leave nothing out, however little it brings.
     pub keep_all: bool,
+    /// Sweeps by which the transfer operator is examined; zero: not at all.
+    pub operator_sweeps: u32,
     /// Iterations that were completed before.
     pub completed: u32,
     /// Looked at at least every few milliseconds.

@@ -297,7 +297,11 @@ impl Segment {
         context.counters.dropped.fetch_add(self.samples.camera.dropped, Relaxed);
         // figures that hardly change are taken ever more rarely
         if solved && (index + 1).is_power_of_two() {
-            let report = self.reflected.report(sampled, &self.weights, cut);
+            let sweeps = match (self.techniques.estimator, context.max_depth) {
+                (Estimator::LeaveOneOut, None) => context.operator_sweeps,
+                _ => 0,
+            };
+            let report = self.reflected.report(sampled, &self.weights, &self.starts, sweeps, cut);
             *locked(&context.counters.graph) = Some(report);
             costs.stage("report", 0);
         }

@@ -254,6 +254,7 @@ impl Session {
         let context = |completed: u32| Context {
             completed,
             keep_all: self.settings.keep_all,
+            operator_sweeps: self.settings.operator_sweeps,
             world: &self.world,
             sensor: &self.sensor,
             film: &self.film,

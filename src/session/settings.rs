@@ -98,6 +98,8 @@ pub struct Settings {
     pub passes: PassSet,
     /// Leave nothing out.
     pub keep_all: bool,
+    /// Sweeps by which the statistics examine the transfer operator; 0: not at all.
+    pub operator_sweeps: u32,
 }
 
 /// When a render stops: at whichever limit comes first. At least one is set.
@@ -138,6 +140,7 @@ struct Json {
     transparent_background: bool,
     passes: Vec<String>,
     keep_all: bool,
+    operator_sweeps: u32,
 }
 
 impl Default for Json {
@@ -168,6 +171,7 @@ impl Default for Json {
             transparent_background: false,
             passes: vec!["Combined".into()],
             keep_all: false,
+            operator_sweeps: 0,
         }
     }
 }
@@ -284,6 +288,7 @@ impl Settings {
             transparent_background: j.transparent_background,
             passes,
             keep_all: j.keep_all,
+            operator_sweeps: j.operator_sweeps,
         })
     }
 }

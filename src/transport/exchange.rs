@@ -135,23 +135,26 @@ pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
     per_index(s, one)
 }
 
-/// One sweep: next-event light, and the `values` of the segments that leave a cluster, reflected at its arrivals.
+/// Next-event light, and the `values` of the segments that leave a cluster, reflected at its arrivals.
 pub(super) fn gather(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec<Vec3> {
+    let mut light = reflect(s, w, values, cut);
+    light.par_iter_mut().zip(&s.clusters.place).for_each(|(l, &place)| *l += w.direct[place as usize]);
+    light
+}
+
+/// What arrivals reflect of the `values` of the segments that leave their clusters.
+pub(super) fn reflect(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec<Vec3> {
     let shared = per_diffuse_cluster(s, cut, |c| {
         let leaving = s.cameras(c).map(|i| (values[i] * s.camera.outgoing[i].pdf).as_dvec3());
         leaving.sum::<DVec3>().as_vec3() / c.area
     });
-    per_arrival(s, cut, |i, k, c| {
-        let place = s.clusters.place[i];
-        let reflected = match c.class {
-            SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * shared[k],
-            SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let f = w.row(k, (place - c.first) as usize);
-                let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| *f * values[i]).sum();
-                sum / c.area
-            }
-        };
-        w.direct[place as usize] + reflected
+    per_arrival(s, cut, |i, k, c| match c.class {
+        SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * shared[k],
+        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+            let f = w.row(k, (s.clusters.place[i] - c.first) as usize);
+            let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| *f * values[i]).sum();
+            sum / c.area
+        }
     })
 }
 

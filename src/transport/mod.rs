@@ -15,6 +15,7 @@ pub mod guiding;
 pub mod kernel;
 pub mod light;
 mod literal;
+pub mod operator;
 mod own_path;
 mod photons;
 pub mod propagate;

@@ -48,11 +48,7 @@ impl Reflected {
             if cut.is_raised() {
                 return false;
             }
-            let brought = per_index(s, |i| {
-                let segment = &self.segments[i];
-                segment.value(segment.emitted, has_end(s, i).then(|| self.end_of(i)))
-            });
-            self.carried = gather(s, w, &brought, cut);
+            self.carried = self.sweep(s, w, &self.carried, cut);
             let now = total(&|i| self.carried[i]);
             let change = (now - before).abs();
             before = now;
@@ -69,6 +65,16 @@ impl Reflected {
             self.direct.par_iter_mut().zip(first).enumerate().for_each(seen);
         }
         !cut.is_raised()
+    }
+
+    /// One sweep: what arrivals reflect if they reflected so much carried light before.
+    pub(super) fn sweep(&self, s: Sampled, w: &Weights, carried: &[Vec3], cut: &Cut) -> Vec<Vec3> {
+        let brought = per_index(s, |i| {
+            let segment = &self.segments[i];
+            segment
+                .value(segment.emitted, has_end(s, i).then(|| (carried[i + 1], self.photons[i + 1].brought)))
+        });
+        gather(s, w, &brought, cut)
     }
 
     /// What arrival `i` reflects along its primary segment.
@@ -91,7 +97,7 @@ impl Reflected {
     }
 
     /// What every path's own tail says of the light it carries, from its end backwards.
-    fn own_tails(&self, s: Sampled, w: &Weights, starts: &[u32], cut: &Cut) -> Vec<Vec3> {
+    pub(super) fn own_tails(&self, s: Sampled, w: &Weights, starts: &[u32], cut: &Cut) -> Vec<Vec3> {
         let n = s.camera.arrivals.len();
         let some_paths = |(k, paths): (usize, &[u32])| {
             let first = paths[0] as usize;

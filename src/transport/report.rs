@@ -3,6 +3,7 @@
 
 use super::Cut;
 use super::exchange::{Segment, per_arrival, per_diffuse_cluster};
+use super::operator::Sweeps;
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use crate::shading::SurfaceClass;
@@ -18,6 +19,8 @@ pub struct Report {
     pub largest: u32,
     /// Row sums of the transfer operator between camera segments, largest channel.
     pub row_sums: RowSums,
+    /// What many sweeps do, if somebody asked.
+    pub sweeps: Option<Sweeps>,
 }
 
 /// How strongly arrivals reflect what leaves their clusters.
@@ -32,10 +35,12 @@ pub struct RowSums {
 }
 
 impl Reflected {
-    /// Looks at the iteration that was solved. If it is stopped, what it says is incomplete.
-    pub fn report(&self, s: Sampled, w: &Weights, cut: &Cut) -> Report {
+    /// Looks at the iteration that was solved. `starts`: for every path, its first arrival. `count`: of
+    /// [`Reflected::sweeps`]; zero: none. If it is stopped, what it says is incomplete.
+    pub fn report(&self, s: Sampled, w: &Weights, starts: &[u32], count: u32, cut: &Cut) -> Report {
         let (sizes, largest) = sizes(s);
-        Report { sizes, largest, row_sums: row_sums(s, w, &self.segments, cut) }
+        let sweeps = (count > 0).then(|| self.sweeps(s, w, starts, count, cut));
+        Report { sizes, largest, row_sums: row_sums(s, w, &self.segments, cut), sweeps }
     }
 }
 

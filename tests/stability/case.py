@@ -25,6 +25,8 @@ class Row:
     #: For plots: the parameter as a number, and the line it belongs to.
     at: float | None = None
     line: str = ""
+    #: Whether `expected` is a bound that `got` must stay below.
+    is_bound: bool = False
 
     @property
     def off(self) -> float:
@@ -40,7 +42,12 @@ class Row:
 
     @property
     def is_right(self) -> bool:
-        """Within the tolerance and three standard errors, each at most half of it."""
+        """Below the bound; or within the tolerance and three standard errors.
+
+        One standard error may be half the tolerance at most.
+        """
+        if self.is_bound:
+            return self.refused == 0 and self.got < self.expected
         sound = math.isfinite(self.got) and self.noise <= max(self.tolerance / 2, 1e-12)
         return sound and self.refused == 0 and abs(self.off) <= self.tolerance + 3 * self.noise
 
@@ -96,6 +103,20 @@ def beside(parameter: str, reference: Means, got: Means, tolerance: float) -> Ro
     return Row(parameter, reference.mean, got.mean, error, tolerance, refused)
 
 
-def exact(parameter: str, expected: float, got: float, tolerance: float = 0.0) -> Row:
+def exact(
+    parameter: str, expected: float, got: float, tolerance: float = 0.0, refused: int = 0
+) -> Row:
     """A row without noise."""
-    return Row(parameter, expected, got, 0.0, tolerance)
+    return Row(parameter, expected, got, 0.0, tolerance, refused)
+
+
+def below(
+    parameter: str,
+    bound: float,
+    got: float,
+    refused: int = 0,
+    at: float | None = None,
+    line: str = "",
+) -> Row:
+    """A row whose value must stay below a bound."""
+    return Row(parameter, bound, got, 0.0, 0.0, refused, at, line, True)

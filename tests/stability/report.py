@@ -9,9 +9,13 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import suite  # noqa: F401  (registers the cases)
 from case import CASES, Case, Row
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 HEAD = Path(__file__).with_name("report_head.md")
@@ -27,6 +31,9 @@ def table(rows: Sequence[Row]) -> list[str]:
         verdict = "right" if r.is_right else "**wrong**"
         if r.refused:
             verdict += f", {r.refused} samples refused"
+        if r.is_bound:
+            lines.append(f"| {r.parameter} | < {r.expected:.6g} | {r.got:.6g} | | | | {verdict} |")
+            continue
         lines.append(
             f"| {r.parameter} | {r.expected:.6g} | {r.got:.6g} | {r.off:+.2%} | {r.noise:.2%} "
             f"| {r.tolerance:.2%} | {verdict} |"
@@ -34,31 +41,35 @@ def table(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
+def deviations(axes: Axes, rows: Sequence[Row], label: str | None) -> None:
+    """Draws deviations from the right value, what is allowed, and noise."""
+    at, off = [r.at for r in rows], [100 * r.off for r in rows]
+    axes.errorbar(at, off, [100 * r.noise for r in rows], marker="o", capsize=3, label=label)
+    for sign in (-1, 1):
+        allowed = [sign * 100 * r.tolerance for r in rows]
+        axes.plot(at, allowed, color="grey", lw=0.8, ls=":")
+    axes.axhline(0, color="black", lw=0.8)
+    axes.set_ylabel("off, %")
+
+
+def bounded(axes: Axes, rows: Sequence[Row], label: str | None) -> None:
+    """Draws values that have a bound."""
+    axes.plot([r.at for r in rows], [r.got for r in rows], marker="o", label=label)
+    axes.set_yscale("log")
+
+
 def plot(case: Case, rows: Sequence[Row]) -> str | None:
-    """Draws deviations over the parameter, if that is a number; the picture's name."""
+    """Draws rows over their parameter, if that is a number; the picture's name."""
     if any(r.at is None for r in rows):
         return None
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(6, 3), layout="constrained")
+    draw = bounded if all(r.is_bound for r in rows) else deviations
     for line in dict.fromkeys(r.line for r in rows):
-        own = [r for r in rows if r.line == line]
-        at, off = [r.at for r in own], [100 * r.off for r in own]
-        axes.errorbar(
-            at, off, [100 * r.noise for r in own], marker="o", capsize=3, label=line or None
-        )
-    for sign in (-1, 1):
-        axes.plot(
-            [r.at for r in rows],
-            [sign * 100 * r.tolerance for r in rows],
-            color="grey",
-            lw=0.8,
-            ls=":",
-        )
-    axes.axhline(0, color="black", lw=0.8)
+        draw(axes, [r for r in rows if r.line == line], line or None)
     axes.set_xscale("log")
     axes.set_xlabel(case.axis)
-    axes.set_ylabel("off, %")
     axes.set_title(case.name, fontsize=9)
     if any(r.line for r in rows):
         axes.legend(fontsize=7)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gallery
 import inputs
 import ranges
 import stiff
 import surfaces
+import sweeps
 
-__all__ = ["inputs", "ranges", "stiff", "surfaces"]
+__all__ = ["gallery", "inputs", "ranges", "stiff", "surfaces", "sweeps"]

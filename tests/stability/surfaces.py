@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from case import Rows, beside, case, exact, row
+from case import Rows, beside, case, row
 from stage import DIFFUSE, SHARP, Stage
 
 GROUP = "Surfaces"
@@ -117,19 +117,6 @@ def triangles(full: bool) -> Rows:
     s.light("dome", radiance=[1, 1, 1])
     s.camera([0, -0.5, 0.8], [0, 0, 0], 0.1)
     yield row("a floor of strips and needles", 0.5, s.means(20, 16, 6), 0.01)
-
-
-@case(GROUP, "bit for bit the picture of one thread")
-def threads(full: bool) -> Rows:
-    """The same picture with 1, 2 and 7 threads."""
-    s = ball({"type": "glass", "roughness": 0.2})
-    s.floor(3.0, {"type": "glossy", "roughness": 0.3}, -1.0)
-    side = 96 if full else 48
-    one, _ = s.render(side, 8, threads=1)
-    for count in (2, 7):
-        picture, _ = s.render(side, 8, threads=count)
-        different = np.count_nonzero(picture.view(np.uint32) != one.view(np.uint32))
-        yield exact(f"{count} threads: components that differ", 0.0, float(different))
 
 
 @case(GROUP, "the mean of a smaller picture")

@@ -23,15 +23,15 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 /// Number of nodes along the axes of the tables. Nodes are evenly spaced from zero to one.
 pub mod grid {
     /// Perceptual roughness, of the geometric mean of the two alphas.
-    pub const ROUGHNESS: usize = 24;
+    pub const ROUGHNESS: usize = 32;
     /// Elevation, as [`super::elevation_coordinate`].
-    pub const ELEVATION: usize = 24;
+    pub const ELEVATION: usize = 32;
     /// Roughness of refracting interfaces and layers, as [`super::glass_roughness_coordinate`].
-    pub const GLASS_ROUGHNESS: usize = 32;
+    pub const GLASS_ROUGHNESS: usize = 48;
     /// Elevation over refracting interfaces.
-    pub const GLASS_ELEVATION: usize = 32;
+    pub const GLASS_ELEVATION: usize = 64;
     /// Refractive index, as [`super::index_coordinate`].
-    pub const INDEX: usize = 16;
+    pub const INDEX: usize = 24;
     /// Square root of the cosine, for the layers' Fresnel averages.
     pub const COSINE: usize = 24;
     /// Elevation of the anisotropic table.
