@@ -97,8 +97,11 @@ fn the_literal_recursion_has_the_bias_that_leaving_one_out_removes() {
     assert_agree("many photons", many_literal, many, 1e-2);
     let none = r#","light_paths":0,"max_depth":3"#;
     let literal = format!(r#"{none},"estimator":"literal""#);
-    let alike = (render(1.0, 16, none).0, render(1.0, 16, &literal).0);
-    assert!((alike.0 / alike.1 - 1.0).abs() < 1e-5, "{alike:?}");
+    // but for paths that return to a cluster, of which there are few where the kernel is small
+    for (size, allowed) in [(1.0, 1e-3), (0.02, 1e-5)] {
+        let alike = (render(size, 16, none).0, render(size, 16, &literal).0);
+        assert!((alike.0 / alike.1 - 1.0).abs() < allowed, "{size}: {alike:?}");
+    }
 }
 
 #[test]

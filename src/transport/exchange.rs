@@ -3,8 +3,9 @@
 use super::Cut;
 use super::bridge::Bridges;
 use super::cluster::Cluster;
+use super::returns::gathers;
 use super::store::EmissionHit;
-use super::weigh::{Sampled, Weights};
+use super::weigh::{Density, Sampled, Weights};
 use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -111,10 +112,12 @@ pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
             return Segment::default();
         }
         let here = s.cluster_of(i);
-        let p_camera = w.densities[s.clusters.place[i] as usize].camera;
+        let Density { camera: p_camera, apart, .. } = w.densities[s.clusters.place[i] as usize];
+        // paired values have it within
+        let within = if here.class == SurfaceClass::Diffuse { 1.0 } else { apart };
         let constants = Segment {
             emitted: emitted(s, w, i, None),
-            continuation: p_camera / (a.survival * out.pdf),
+            continuation: p_camera * reciprocal(a.survival * out.pdf * within),
             ..Segment::default()
         };
         if !has_end(s, i) {
@@ -144,12 +147,21 @@ pub(super) fn gather(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec
 
 /// What arrivals reflect of the `values` of the segments that leave their clusters.
 pub(super) fn reflect(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec<Vec3> {
-    let shared = per_diffuse_cluster(s, cut, |c| {
-        let leaving = s.cameras(c).map(|i| (values[i] * s.camera.outgoing[i].pdf).as_dvec3());
-        leaving.sum::<DVec3>().as_vec3() / c.area
-    });
+    let arriving = |i: usize| (values[i] * s.camera.outgoing[i].pdf).as_dvec3();
+    let shared =
+        per_diffuse_cluster(s, cut, |c| s.cameras(c).map(arriving).sum::<DVec3>().as_vec3() / c.area);
+    let of_others = |i: usize, c: &Cluster, apart: f32| {
+        let row = (s.clusters.place[i] - c.first) as usize;
+        let kin = s.kin(c, row);
+        let all = s.cameras(c).enumerate().filter(|&(column, _)| gathers(&kin, row, column));
+        all.map(|(_, i)| arriving(i)).sum::<DVec3>().as_vec3() * (apart / c.area)
+    };
     per_arrival(s, cut, |i, k, c| match c.class {
-        SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * shared[k],
+        SurfaceClass::Diffuse => {
+            let apart = w.densities[s.clusters.place[i] as usize].apart;
+            let arriving = if apart == 1.0 { shared[k] } else { of_others(i, c, apart) };
+            s.camera.arrivals[i].reflectance * arriving
+        }
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
             let f = w.row(k, (s.clusters.place[i] - c.first) as usize);
             let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| *f * values[i]).sum();

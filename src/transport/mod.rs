@@ -20,6 +20,7 @@ mod own_path;
 mod photons;
 pub mod propagate;
 pub mod report;
+mod returns;
 pub mod sizes;
 pub mod store;
 #[cfg(test)]

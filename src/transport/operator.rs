@@ -66,7 +66,8 @@ impl Reflected {
             });
             light = reflect(s, w, &brought, cut);
             let left = norm(&light) / first;
-            if left == 0.0 || cut.is_raised() {
+            // what is left is not told from nothing
+            if left < f64::from(f32::MIN_POSITIVE) || cut.is_raised() {
                 return [0.0, peak.exp()];
             }
             now += left.ln();

@@ -2,12 +2,10 @@
 //! operator feeds back. Its spectral radius is at most its largest row sum.
 
 use super::Cut;
-use super::exchange::{Segment, per_arrival, per_diffuse_cluster};
+use super::exchange::{Segment, per_index, reflect};
 use super::operator::Sweeps;
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
-use crate::shading::SurfaceClass;
-use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 /// Figures of one iteration.
@@ -60,17 +58,8 @@ fn sizes(s: Sampled) -> (Vec<u64>, u32) {
 }
 
 fn row_sums(s: Sampled, w: &Weights, constants: &[Segment], cut: &Cut) -> RowSums {
-    let shared = per_diffuse_cluster(s, cut, |c| {
-        let leaving = s.cameras(c).map(|i| (constants[i].carry * s.camera.outgoing[i].pdf).as_dvec3());
-        leaving.sum::<DVec3>().as_vec3() / c.area
-    });
-    let sums = per_arrival(s, cut, |i, k, c| match c.class {
-        SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * shared[k],
-        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-            let f = w.row(k, (s.clusters.place[i] - c.first) as usize);
-            f.iter().zip(s.cameras(c)).map(|(f, i)| *f * constants[i].carry).sum::<Vec3>() / c.area
-        }
-    });
+    let carries = per_index(s, |i| constants[i].carry);
+    let sums = reflect(s, w, &carries, cut);
     let mut found = RowSums { least: f32::INFINITY, ..RowSums::default() };
     for sum in sums.iter().map(|v| v.max_element()) {
         found.least = found.least.min(sum);

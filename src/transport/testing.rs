@@ -1,12 +1,16 @@
 //! What the unit tests share.
 
-use super::Cut;
+use super::camera::CameraSampler;
 use super::cluster::{Areas, Clusters, Numbered};
 use super::grid::Grid;
+use super::light::LightSampler;
 use super::store::{CameraStore, LightStore};
+use super::{Cut, Estimator};
+use crate::math::{Sampler, warp};
 use crate::scene::mesh::MeshInput;
 use crate::scene::{Camera, InstanceGroup, SceneBuilder};
-use crate::shading::{Sensor, World};
+use crate::shading::emitters::PLAIN;
+use crate::shading::{CameraRay, Sensor, World};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -50,6 +54,33 @@ pub fn room(wall: &str) -> World {
 /// The room's camera.
 pub fn sensor() -> Sensor {
     Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40)
+}
+
+/// Paths of both sides in such a room.
+pub fn sampled(world: &World, seed: u32, camera_paths: u32, light_paths: u32) -> (CameraStore, LightStore) {
+    let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
+    let sensor = sensor();
+    let sampler = CameraSampler {
+        world,
+        sensor: &sensor,
+        guide: &PLAIN,
+        light_paths: light_paths as f32,
+        transparent_background: false,
+        max_depth: None,
+        next_event: true,
+        goes_on: true,
+    };
+    for k in 0..camera_paths {
+        let mut random = Sampler::new(seed, k, 0);
+        let direction = warp::uniform_sphere(random.next_2d());
+        let ray = CameraRay { origin: Vec3::new(0.1, 0.2, 0.5), direction, range: [0.0, f32::INFINITY] };
+        sampler.path(&ray, &mut random, &mut camera, &mut 0);
+    }
+    let estimator = Estimator::LeaveOneOut;
+    let sampler =
+        LightSampler { world, guide: &PLAIN, paths: light_paths as f32, next_event: true, estimator };
+    (0..light_paths).for_each(|k| sampler.path(k, &mut Sampler::new(!seed, k, 0), &mut light, &mut 0));
+    (camera, light)
 }
 
 /// Clusters of these arrivals in that room.

@@ -7,6 +7,7 @@
 
 use super::bridge::Bridges;
 use super::cluster::{Cluster, Clusters};
+use super::returns::{gathers, ratio};
 use super::store::{CameraStore, LightStore, NextEvent};
 use super::{Cut, Estimator};
 use crate::math::density::ProjectedPdf;
@@ -24,6 +25,9 @@ pub struct Density {
     /// `P_light` of the segment that brought a camera arrival; of the segment that leaves a light arrival, for
     /// leaving one out without the part of its own path.
     pub light: f32,
+    /// `P_cam` of the segment that leaves a camera arrival, over the same without the part of its path's other
+    /// arrivals; one where it has none, or nobody leaves them out.
+    pub apart: f32,
 }
 
 /// The next-event segment of a camera arrival.
@@ -258,11 +262,18 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
         }
     }
     let arriving = arriving.as_vec3() / c.area;
-    for i in s.cameras(c) {
+    for (row, i) in s.cameras(c).enumerate() {
         let a = &s.camera.arrivals[i];
-        batch
-            .densities
-            .push(Density { camera: q_camera * s.camera.outgoing[i].pdf, light: q_light * a.back_pdf });
+        let kin = s.kin(c, row);
+        let apart = match estimator == Estimator::LeaveOneOut && kin.len() > 1 {
+            true => {
+                let all = s.cameras(c).enumerate().filter(|&(column, _)| gathers(&kin, row, column));
+                ratio(q_camera, all.map(|(_, i)| s.camera.arrivals[i].survival).sum())
+            }
+            false => 1.0,
+        };
+        let camera = q_camera * s.camera.outgoing[i].pdf;
+        batch.densities.push(Density { camera, light: q_light * a.back_pdf, apart });
         batch.direct.push(a.reflectance * arriving);
         if let Some(bridges) = s.bridges {
             let b = &bridges.segments[i];
@@ -275,7 +286,11 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             Estimator::LeaveOneOut => (q_light - own).max(0.0),
             Estimator::Literal | Estimator::WholePath => q_light,
         };
-        batch.densities.push(Density { camera: q_camera * a.back_pdf, light: q * s.light.photons[j].pdf });
+        batch.densities.push(Density {
+            camera: q_camera * a.back_pdf,
+            light: q * s.light.photons[j].pdf,
+            apart: 1.0,
+        });
         batch.direct.push(a.reflectance * arriving);
         batch.bridged.extend(s.bridges.map(|_| Vec3::ZERO));
     }
@@ -294,7 +309,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let (n, m) = (cameras.len(), lights.len());
     let width = columns(s, c);
     let first = batch.densities.len();
-    batch.densities.resize(first + n + m, Density::default());
+    batch.densities.resize(first + n + m, Density { apart: 1.0, ..Density::default() });
     batch.direct.resize(first + n + m, Vec3::ZERO);
     let matrix = batch.values.len();
     // who gathers, as seen from where, and with which `q`: a light arrival's path is no technique of the camera
@@ -319,6 +334,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let mut bridge_pdfs = vec![0.0; n];
     let mut next_event_pdfs = vec![0.0; n];
     let mut next_event_values = vec![Vec3::ZERO; rows * n];
+    let mut leaving_pdfs = vec![0.0; rows * n];
     for (row, (bsdf, wo, q)) in gatherers.iter().enumerate() {
         let sight = bsdf.sight(*wo, Among::Continuous);
         let look = |w: Vec3| {
@@ -330,6 +346,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             if s.camera.arrivals[*i].goes_on {
                 let (pdf, value) = look(s.camera.outgoing[*i].direction);
                 densities[column].camera += pdf;
+                leaving_pdfs[row * n + column] = pdf;
                 batch.values[matrix + row * width + column] = value;
             }
             let next_event = &s.camera.next_events[*i];
@@ -350,6 +367,27 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
             bridge_pdfs[column] += pdf;
             batch.values[matrix + row * width + n + m + column] =
                 value / bsdf.relative_index(*wo, b.direction).powi(2);
+        }
+    }
+    if estimator == Estimator::LeaveOneOut {
+        for row in 0..n {
+            let kin = s.kin(c, row);
+            if kin.len() == 1 {
+                continue;
+            }
+            for column in (0..n).filter(|&column| s.camera.arrivals[cameras[column].0].goes_on) {
+                let value = &mut batch.values[matrix + row * width + column];
+                if !gathers(&kin, row, column) {
+                    *value = Vec3::ZERO;
+                    continue;
+                }
+                let rest = (0..n).filter(|&r| gathers(&kin, row, r)).map(|r| leaving_pdfs[r * n + column]);
+                let apart = ratio(densities[column].camera, rest.sum());
+                *value *= apart;
+                if column == row {
+                    densities[column].apart = apart;
+                }
+            }
         }
     }
     if s.bridges.is_some() {

@@ -36,7 +36,7 @@ fn render(s: &Stage, side: u32, samples: u32, settings: &str) -> (f64, Report) {
 fn a_million_arrivals_share_a_few_clusters() {
     let s = furnace(DIFFUSE);
     let (mean, graph) =
-        render(&s, 1000, 1, r#","kernel":"fixed","kernel_size":1000,"light_paths":0,"memory_budget":4096"#);
+        render(&s, 1000, 1, r#","kernel":"fixed","kernel_size":1000,"light_paths":0,"memory_budget":8192"#);
     assert!(graph.largest >= 1_000_000, "{graph:?}");
     assert_close("a million", mean, 2.0, 1.5e-3);
 }

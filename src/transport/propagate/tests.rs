@@ -1,42 +1,9 @@
 //! The transfer operator between the camera's segments contracts, whatever the surfaces and the clusters.
 
 use super::*;
-use crate::math::{Sampler, warp};
-use crate::shading::emitters::PLAIN;
-use crate::shading::{CameraRay, World};
 use crate::transport::Estimator;
-use crate::transport::camera::CameraSampler;
 use crate::transport::cluster::Areas;
-use crate::transport::light::LightSampler;
-use crate::transport::store::{CameraStore, LightStore};
-use crate::transport::testing::{ON, clustered, room, sensor};
-
-/// Paths of both sides in a glowing room.
-fn sampled(world: &World, seed: u32, camera_paths: u32, light_paths: u32) -> (CameraStore, LightStore) {
-    let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
-    let sensor = sensor();
-    let sampler = CameraSampler {
-        world,
-        sensor: &sensor,
-        guide: &PLAIN,
-        light_paths: light_paths as f32,
-        transparent_background: false,
-        max_depth: None,
-        next_event: true,
-        goes_on: true,
-    };
-    for k in 0..camera_paths {
-        let mut random = Sampler::new(seed, k, 0);
-        let direction = warp::uniform_sphere(random.next_2d());
-        let ray = CameraRay { origin: Vec3::new(0.1, 0.2, 0.5), direction, range: [0.0, f32::INFINITY] };
-        sampler.path(&ray, &mut random, &mut camera, &mut 0);
-    }
-    let estimator = Estimator::LeaveOneOut;
-    let sampler =
-        LightSampler { world, guide: &PLAIN, paths: light_paths as f32, next_event: true, estimator };
-    (0..light_paths).for_each(|k| sampler.path(k, &mut Sampler::new(!seed, k, 0), &mut light, &mut 0));
-    (camera, light)
-}
+use crate::transport::testing::{ON, clustered, room, sampled};
 
 #[test]
 fn no_surface_and_no_cluster_makes_the_sweeps_diverge() {
