@@ -3,7 +3,7 @@
 use super::Cut;
 use super::bridge::Bridges;
 use super::cluster::Cluster;
-use super::returns::gathers;
+use super::returns::Gathered;
 use super::store::EmissionHit;
 use super::weigh::{Density, Sampled, Weights};
 use crate::shading::SurfaceClass;
@@ -152,9 +152,8 @@ pub(super) fn reflect(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Ve
         per_diffuse_cluster(s, cut, |c| s.cameras(c).map(arriving).sum::<DVec3>().as_vec3() / c.area);
     let of_others = |i: usize, c: &Cluster, apart: f32| {
         let row = (s.clusters.place[i] - c.first) as usize;
-        let kin = s.kin(c, row);
-        let all = s.cameras(c).enumerate().filter(|&(column, _)| gathers(&kin, row, column));
-        all.map(|(_, i)| arriving(i)).sum::<DVec3>().as_vec3() * (apart / c.area)
+        let gathered = Gathered::new(s, c, row);
+        gathered.arrivals(s, c).map(arriving).sum::<DVec3>().as_vec3() * (apart / c.area)
     };
     per_arrival(s, cut, |i, k, c| match c.class {
         SurfaceClass::Diffuse => {

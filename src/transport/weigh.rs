@@ -7,7 +7,7 @@
 
 use super::bridge::Bridges;
 use super::cluster::{Cluster, Clusters};
-use super::returns::{gathers, ratio};
+use super::returns::{Gathered, leave_out, ratio};
 use super::store::{CameraStore, LightStore, NextEvent};
 use super::{Cut, Estimator};
 use crate::math::density::ProjectedPdf;
@@ -264,11 +264,11 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let arriving = arriving.as_vec3() / c.area;
     for (row, i) in s.cameras(c).enumerate() {
         let a = &s.camera.arrivals[i];
-        let kin = s.kin(c, row);
-        let apart = match estimator == Estimator::LeaveOneOut && kin.len() > 1 {
+        let gathered = Gathered::new(s, c, row);
+        let apart = match estimator == Estimator::LeaveOneOut && !gathered.is_all() {
             true => {
-                let all = s.cameras(c).enumerate().filter(|&(column, _)| gathers(&kin, row, column));
-                ratio(q_camera, all.map(|(_, i)| s.camera.arrivals[i].survival).sum())
+                let q = gathered.arrivals(s, c).map(|i| s.camera.arrivals[i].survival);
+                ratio(q_camera, q.sum())
             }
             false => 1.0,
         };
@@ -370,25 +370,7 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
         }
     }
     if estimator == Estimator::LeaveOneOut {
-        for row in 0..n {
-            let kin = s.kin(c, row);
-            if kin.len() == 1 {
-                continue;
-            }
-            for column in (0..n).filter(|&column| s.camera.arrivals[cameras[column].0].goes_on) {
-                let value = &mut batch.values[matrix + row * width + column];
-                if !gathers(&kin, row, column) {
-                    *value = Vec3::ZERO;
-                    continue;
-                }
-                let rest = (0..n).filter(|&r| gathers(&kin, row, r)).map(|r| leaving_pdfs[r * n + column]);
-                let apart = ratio(densities[column].camera, rest.sum());
-                *value *= apart;
-                if column == row {
-                    densities[column].apart = apart;
-                }
-            }
-        }
+        leave_out(s, c, &leaving_pdfs, &mut batch.values[matrix..], width, densities);
     }
     if s.bridges.is_some() {
         batch.bridged.extend(bridges.zip(&bridge_pdfs).map(|(b, &p_cam)| b.value(p_cam, c)));

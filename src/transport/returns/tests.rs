@@ -6,14 +6,14 @@ use crate::shading::bsdf::Among;
 use crate::transport::Estimator;
 use crate::transport::cluster::Areas;
 use crate::transport::exchange::reflect;
+use crate::transport::store::Outgoing;
 use crate::transport::testing::{ON, clustered, room, sampled};
 use crate::transport::weigh::Weights;
-use glam::Vec3;
 
 /// For every camera arrival, the number of its path.
 fn paths(camera: &CameraStore) -> Vec<u32> {
     let mut path = 0;
-    let number = |out: &crate::transport::store::Outgoing| {
+    let number = |out: &Outgoing| {
         let this = path;
         path += u32::from(out.forward == 0.0);
         this
