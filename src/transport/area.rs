@@ -14,9 +14,11 @@ pub const POINTS_OF_PHOTONS: RangeInclusive<u32> = 4..=32;
 pub const FEW_POINTS: u32 = 1;
 /// The same where areas stand in densities themselves, so that both an area and its reciprocal have to be right.
 pub const MOST_POINTS: u32 = 64;
-/// Most points that are tried to find them.
-const MOST_TRIES: u32 = 256;
-/// The same for a rough estimate.
+/// Points that are tried to find all of them, and to find enough; the rest of them is not worth more.
+const TRIES: [u32; 2] = [256, 8192];
+/// Enough of them.
+const ENOUGH: u32 = *POINTS_OF_PHOTONS.start();
+/// Most points that are tried for a rough estimate.
 const FEW_TRIES: u32 = 32;
 /// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
 const NEAR_PLANE: f32 = 0.05;
@@ -72,7 +74,9 @@ impl Cell<'_> {
     /// Estimate by rays through the voxel, along the axis nearest to the normal, which meet what of the surface belongs
     /// to the cluster. Photons are divided by the area, so it is the reciprocal that has to be right on average:
     /// independent points are tried until `wanted` of them lie on the cluster (inverse binomial sampling, Haldane
-    /// 1945). Estimates of different `wanted` are independent. `hidden`: whether a point with its normal is out of
+    /// 1945). Where that takes too many, the next one is taken to be on it: of `M` hits in `N` tries, the `k`-th is
+    /// number `k (N + 1) / (M + 1)` in the mean, so the reciprocal's mean stays as it would have been.
+    /// Estimates of different `wanted` are independent. `hidden`: whether a point with its normal is out of
     /// the representative's sight. Adds the points that were tried to `probes`.
     pub fn coverage(
         &self,
@@ -89,8 +93,9 @@ impl Cell<'_> {
         let at = self.representative.position;
         let seed = hash(wanted, hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits())));
         let (mut sum, mut squares, mut tries, mut found) = (0.0, 0.0, 0, 0);
-        let most = if wanted == FEW_POINTS { FEW_TRIES } else { MOST_TRIES };
-        while tries < most && found < wanted {
+        let mut goal = wanted;
+        let mut most = if wanted == FEW_POINTS { FEW_TRIES } else { TRIES[0] };
+        while found < goal && tries < most {
             let u = Vec2::new(hash_unit(seed, 2 * tries), hash_unit(seed, 2 * tries + 1));
             tries += 1;
             let mut top = low;
@@ -131,16 +136,20 @@ impl Cell<'_> {
                 }
             });
             found += u32::from(is_there);
+            if tries == TRIES[0] && found < ENOUGH {
+                (goal, most) = (ENOUGH, TRIES[1]);
+            }
         }
         *probes += u64::from(tries);
-        // the cluster has arrivals, so it is somewhere between the points
+        let cut_short = if found < goal { 1.0 } else { 0.0 };
+        let area_of_try = edge * edge / (tries as f32 + cut_short);
         if found == 0 {
-            return self.plane_cut(at).min(edge * edge / tries as f32);
+            return self.plane_cut(at).min(area_of_try);
         }
         // the reciprocal of a mean of slopes is too large by their variance over their number, to first order
         let spread =
             if found > 1 { (found as f32 * squares / (sum * sum) - 1.0) / (found - 1) as f32 } else { 0.0 };
-        sum / tries as f32 * edge * edge * (1.0 + spread)
+        sum * (1.0 + cut_short / found as f32) * area_of_try * (1.0 + spread)
     }
 }
 

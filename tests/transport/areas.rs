@@ -128,6 +128,31 @@ fn of_a_thin_plate_one_side_counts() {
 }
 
 #[test]
+fn a_ribbon_that_few_points_of_its_voxels_meet() {
+    let (x, width) = (0.5, EDGE / 300.0);
+    let mut s = Stage::default();
+    let grey = s.material(GREY);
+    s.quad([[x, 0., 0.], [x + width, 0., 0.], [x + width, 1., 0.], [x, 1., 0.]], grey);
+    let world = world(&mut s);
+    let fall = |seed| {
+        let u = |k: u32, d| hash_unit(seed ^ 0x517b, 2 * k + d);
+        let from = |k| Vec3::new(x + width * u(k, 0), u(k, 1), 1.0);
+        (0..400).filter_map(|k| arrive(&world, from(k), -Vec3::Z)).collect()
+    };
+    let truth = |grid: &Grid, arrivals: &[Arrival]| {
+        let area = |a: &Arrival| {
+            let (low, edge) = grid.place(&grid.voxel(a.position));
+            let across = (low.x + edge).min(x + width) - low.x.max(x);
+            (low.y >= 0.0 && low.y + edge < 1.0).then(|| f64::from(across * edge))
+        };
+        arrivals.iter().map(area).collect()
+    };
+    let [found, _] = bias(&world, 200, fall, &truth);
+    println!("ribbon: coverage {:+.2} %", 100.0 * (found - 1.0));
+    assert!((found - 1.0).abs() < 0.02, "{found}");
+}
+
+#[test]
 fn a_tilted_plane_is_cut_exactly() {
     let mut s = Stage::default();
     let grey = s.material(GREY);
