@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from sections import replace_section
 from segue import Render, Scene, images, usd
-from two_references import SHARP, relative_error
+from two_references import SHARP, relative, relative_error
 
 ROOT = Path(__file__).parent.parent
 KEPT = ROOT / "results" / "honesty"
@@ -57,7 +57,7 @@ def references(name: str, scene: Scene) -> list[np.ndarray]:
     """Two pictures whose noise is independent."""
     found = []
     for k in range(2):
-        path = KEPT / f"{name}-{k}.exr"
+        path = KEPT / f"{name}-{RESOLUTION[0]}-{REFERENCE_SECONDS:g}s-{k}.exr"
         if not path.exists():
             KEPT.mkdir(parents=True, exist_ok=True)
             sharp = {**SHARP, "seed": SHARP["seed"] + k}
@@ -75,7 +75,8 @@ def measure(name: str) -> tuple[list[str], list[float]]:
     for seconds in SECONDS:
         told = [render(scene, time=seconds, seed=seed) for seed in range(SEEDS)]
         true = [relative_error(t.picture, first, second) for t in told]
-        both = relative_error(told[0].picture, first, second, told[1].picture)
+        common = (told[0].picture - first) * (told[1].picture - second)
+        both = relative(common, (first + second) / 2)
         within = [t.error / e for t, e in zip(told, true, strict=True)]
         ratios += within
         cells = [np.mean(true), both, *np.mean([(t.error, t.bias) for t in told], 0)]

@@ -23,15 +23,9 @@ def relative(squares: np.ndarray, mean: np.ndarray) -> float:
     return float((squares / (smooth(mean) ** 2 + (0.01 * mean.mean()) ** 2)).mean())
 
 
-def relative_error(
-    picture: np.ndarray,
-    first: np.ndarray,
-    second: np.ndarray,
-    other: np.ndarray | None = None,
-) -> float:
-    """Relative mean squared error: squares are products of the differences from both references. With another picture, of
-    what both have in common."""
-    squares = (picture - first) * ((picture if other is None else other) - second)
+def relative_error(picture: np.ndarray, first: np.ndarray, second: np.ndarray) -> float:
+    """Relative mean squared error: squares are products of the differences from both references."""
+    squares = (picture - first) * (picture - second)
     return relative(squares, (first + second) / 2)
 
 

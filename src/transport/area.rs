@@ -14,9 +14,9 @@ pub const POINTS_OF_PHOTONS: RangeInclusive<u32> = 4..=32;
 pub const FEW_POINTS: u32 = 1;
 /// The same where areas stand in densities themselves, so that both an area and its reciprocal have to be right.
 pub const MOST_POINTS: u32 = 64;
-/// Points that are tried to find all of them, and to find enough; the rest of them is not worth more.
+/// Most points that are tried to find them, and most where these found fewer than [`ENOUGH`].
 const TRIES: [u32; 2] = [256, 8192];
-/// Enough of them.
+/// So many are looked for further.
 const ENOUGH: u32 = *POINTS_OF_PHOTONS.start();
 /// Most points that are tried for a rough estimate.
 const FEW_TRIES: u32 = 32;
