@@ -3,7 +3,7 @@
 mod common;
 
 use common::{PATH, POINT, RECT, Stage, WALL, corner_with_ball};
-use segue::film::Pass;
+use segue::film::{Hints, Pass};
 
 /// The mean of a pass and its standard error, from 4 seeds.
 fn estimate(s: &Stage, side: u32, samples: u32, pass: Pass, settings: &str) -> (f64, f64) {
@@ -206,7 +206,7 @@ fn the_systematic_error_of_large_kernels_is_told() {
         for more in ["", r#","next_event":false"#, r#","max_depth":2"#] {
             let bias = |size: f32| {
                 let set = format!(r#","integrator":"segment","kernel":"fixed","kernel_size":{size}{more}"#);
-                s.render(48, 32, &set).film().estimated_error().unwrap().bias.unwrap()
+                s.render(48, 32, &set).film().estimated_error(Hints::default()).unwrap().bias.unwrap()
             };
             let (fine, coarse) = (bias(0.1), bias(24.0));
             println!("{ball} {wall} {more}: {fine:.6} at 0.1 pixels, {coarse:.6} at 24");
@@ -215,7 +215,7 @@ fn the_systematic_error_of_large_kernels_is_told() {
     }
     let mut s = corner_with_ball(WALL, WALL, "");
     s.light(RECT);
-    assert_eq!(s.render(16, 4, PATH).film().estimated_error().and_then(|e| e.bias), None);
+    assert_eq!(s.render(16, 4, PATH).film().estimated_error(Hints::default()).and_then(|e| e.bias), None);
 }
 
 /// Whole paths and the recursion are two estimators of the same light, with other weights. Their samples are the same, so

@@ -1,9 +1,13 @@
 //! How wrong the picture is, told without a reference: systematic error.
 //!
-//! Two things tell it. Some integrators deliver a second estimate of every sample that has no systematic error, but more
-//! noise: the mean difference is the error. And the size of a kernel that varies from sample to sample tells, by the
+//! Three things tell it. Some integrators deliver a second estimate of every sample that has no systematic error, but more
+//! noise: the mean difference is the error, within what noise allows, and but for light that this estimate hardly ever finds.
+//! The size of a kernel that varies from sample to sample tells, by the
 //! slope of the light over the kernel's logarithm, what the kernel brings; that has less noise than path tracing, above
-//! all in caustics. Both are known for the samples of even and for those of odd number, with independent noise, so that the
+//! all in caustics. And an integrator may know what its kernels blur ([`Hints`]). The first is right and bounds what the others
+//! guess.
+//!
+//! The first two are known for the samples of even and for those of odd number, with independent noise, so that the
 //! product is the squared systematic error on average. Summed over blocks of pixels first it is less noisy, and misses
 //! what is finer than a block. Of several sizes of block the one counts that leaves the most beyond doubt.
 
@@ -21,6 +25,30 @@ const DOUBT: f64 = 2.0;
 const PER_SLOPE: f64 = 4.0;
 /// Least mean variance of the size, octaves squared, that tells anything.
 const LEAST_VARIANCE: f64 = 1e-3;
+
+/// Standard errors of the unfiltered estimate by which the others may exceed it.
+const LENIENCE: f64 = 1.0;
+/// By how much more counts what unfiltered estimates hardly find: judged by its surroundings it is more than its share of a
+/// pixel's light.
+const BEYOND: f64 = 3.0;
+
+/// What an integrator knows of its systematic error; all of it relative and squared, means over the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hints {
+    /// What its kernels blur, as far as it knows.
+    pub blur: Option<f64>,
+    /// Share of the light that its unfiltered estimates hardly ever find.
+    pub beyond_unfiltered: f64,
+}
+
+/// The systematic error, squared, in which the witnesses agree best: means over the pixels. `unfiltered`: what is
+/// beyond doubt, and what is as likely as not, see [`bounds`].
+pub(super) fn agreed(unfiltered: Option<[f64; 2]>, by_size: Option<f64>, hints: Hints) -> Option<f64> {
+    let guessed = [by_size, hints.blur].into_iter().flatten().reduce(f64::max);
+    let Some([low, high]) = unfiltered else { return guessed };
+    let low = (low - BEYOND * hints.beyond_unfiltered).max(0.0);
+    Some(guessed.unwrap_or(0.0).min(high).max(low))
+}
 
 /// Something of the samples of even number, and of those of odd number.
 pub(super) type Halves = [Vec3; 2];
@@ -70,14 +98,25 @@ pub(super) fn mean_square_by_size(slopes: &[[Slope; 2]], scales: &[Vec3], width:
 /// Sum over pixels, mean over channels, of the squared systematic error, from the mean differences of the two halves
 /// of every pixel, in rows of `width`; at least zero.
 pub(super) fn mean_square(differences: &[Halves], width: usize) -> f64 {
-    SIDES.into_iter().map(|side| beyond_doubt(differences, width, side)).fold(0.0, f64::max)
+    let beyond_doubt = |side| {
+        let [sum, error] = in_blocks(differences, width, side);
+        sum - DOUBT * error
+    };
+    SIDES.into_iter().map(beyond_doubt).fold(0.0, f64::max)
 }
 
-fn beyond_doubt(differences: &[Halves], width: usize, side: usize) -> f64 {
+/// That, and the most that is as likely as not: no block hides anything from single pixels.
+pub(super) fn bounds(differences: &[Halves], width: usize) -> [f64; 2] {
+    let [sum, error] = in_blocks(differences, width, 1);
+    [mean_square(differences, width), sum.max(0.0) + LENIENCE * error]
+}
+
+/// Sum over the blocks of their products, and its standard error.
+fn in_blocks(differences: &[Halves], width: usize, side: usize) -> [f64; 2] {
     let sums: Vec<[f64; 2]> =
         differences.par_chunks(side * width).map(|rows| of_rows(rows, width, side)).collect();
     let [sum, squares] = sums.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-    sum - DOUBT * squares.sqrt()
+    [sum, squares.sqrt()]
 }
 
 /// Sum over the blocks of a row of them of their products, and of the squares of these.
@@ -151,6 +190,32 @@ mod tests {
         (0..9).for_each(|k| same.add(Vec3::splat(k as f32), 0.3));
         assert_eq!(mean_square_by_size(&[[same; 2]], &[Vec3::ONE], 1), None);
         assert_eq!(mean_square_by_size(&[], &[], 1), None);
+    }
+
+    #[test]
+    fn what_is_right_bounds_what_is_guessed() {
+        let hints = |blur, beyond_unfiltered| Hints { blur, beyond_unfiltered };
+        let told =
+            |unfiltered, by_size, blur, beyond| agreed(unfiltered, by_size, hints(blur, beyond)).unwrap();
+        let known = Some([0.01, 0.02]);
+        assert_eq!(told(known, Some(0.5), Some(0.3), 0.0), 0.02);
+        assert_eq!(told(known, Some(0.012), Some(0.015), 0.0), 0.015);
+        assert_eq!(told(known, None, None, 0.0), 0.01);
+        // light that it does not find is no error of the filter, but more than the difference there is not
+        assert_eq!(told(known, Some(0.5), None, 1.0), 0.02);
+        assert_eq!(told(known, None, Some(0.001), 1.0), 0.001);
+        assert_eq!(told(None, None, Some(0.3), 0.0), 0.3);
+        assert_eq!(agreed(None, None, Hints::default()), None);
+        for seed in 0..10 {
+            // a variance of 0.083 over a square of 0.01, as above
+            let half = |i: usize, k: u32| {
+                let u = |channel| hash_unit(hash(i as u32, seed), 3 * k + channel) - 0.4;
+                Vec3::new(u(0), u(1), u(2))
+            };
+            let differences: Vec<_> = (0..PIXELS).map(|i| [half(i, 0), half(i, 1)]).collect();
+            let [low, high] = bounds(&differences, WIDTH).map(|sum| sum / PIXELS as f64);
+            assert!(low < 0.0105 && (0.0095..0.012).contains(&high), "{low} {high}");
+        }
     }
 
     #[test]

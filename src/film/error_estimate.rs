@@ -4,7 +4,7 @@
 //! `mean((x - r)² / (r² + (0.01 mean r)²))`. It is the sum of what more samples average out ([`super::noise`]) and of what
 //! is systematic ([`super::bias`]).
 
-use super::bias::{self, Halves, Slope};
+use super::bias::{self, Halves, Hints, Slope};
 use super::noise::{Pixel, of_pixel, scales};
 use super::{Film, Tile};
 use glam::Vec3;
@@ -20,11 +20,6 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
-    /// The same where something else tells a systematic error, too: the larger counts.
-    pub fn or_bias(self, other: Option<f64>) -> Self {
-        Self { bias: [self.bias, other].into_iter().flatten().reduce(f64::max), ..self }
-    }
-
     /// Both parts.
     pub fn total(&self) -> f64 {
         self.noise + self.bias.unwrap_or(0.0)
@@ -38,7 +33,9 @@ impl Film {
     /// The noise is right on average for independent samples. Samples that are spread evenly on purpose
     /// (low-discrepancy sequences) make the picture better than their halves tell, so it errs to the safe side
     /// there. It reads the whole film, in parallel: ask between iterations, not for every tile.
-    pub fn estimated_error(&self) -> Option<ErrorEstimate> {
+    ///
+    /// `hints`: what the integrator knows of its systematic error.
+    pub fn estimated_error(&self, hints: Hints) -> Option<ErrorEstimate> {
         let (width, area) = (self.width() as usize, self.rect().area());
         let mut pixels = vec![None; area];
         let (mut differences, mut slopes) = (Vec::new(), Vec::new());
@@ -75,10 +72,11 @@ impl Film {
         for (d, scale) in differences.iter_mut().zip(&scales) {
             *d = d.map(|d| d * scale);
         }
-        let unfiltered = (!differences.is_empty()).then(|| bias::mean_square(&differences, width));
-        let by_size = bias::mean_square_by_size(&slopes, &scales, width);
-        let sum = [unfiltered, by_size].into_iter().flatten().reduce(f64::max);
-        Some(ErrorEstimate { noise, bias: sum.map(|s| s / count as f64) })
+        let count = count as f64;
+        let unfiltered =
+            (!differences.is_empty()).then(|| bias::bounds(&differences, width).map(|sum| sum / count));
+        let by_size = bias::mean_square_by_size(&slopes, &scales, width).map(|sum| sum / count);
+        Some(ErrorEstimate { noise, bias: bias::agreed(unfiltered, by_size, hints) })
     }
 }
 

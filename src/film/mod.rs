@@ -22,6 +22,7 @@ mod sample;
 mod splat;
 mod tile;
 
+pub use bias::Hints;
 pub use buffer::{Film, SharedTile, TILE_SIZE};
 pub use error::FilmError;
 pub use error_estimate::ErrorEstimate;

@@ -6,23 +6,29 @@
 //!
 //! The `r` of the denominator cannot be the pixel itself: where it happens to be dark the quotient explodes.
 //! It is the mean of the pixel's neighbours (not of itself: one far too bright sample would hide the error that it
-//! tells of), drawn back to the pixel where that differs from its
+//! tells of; of a wider neighbourhood where such samples are so rare that the nearest ones happen to have none), drawn back to the pixel where that differs from its
 //! neighbours by more than noise explains (the local linear estimator of J.-S. Lee, "Digital Image
 //! Enhancement and Noise Filtering by Use of Local Statistics", 1980).
 
 use super::Tile;
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::iter::Sum;
 
 /// The neighbourhood of a pixel reaches this far to each side: 5 x 5 pixels. Wider ones blur edges more than
 /// they calm noise.
 const RADIUS: usize = 2;
+/// Sides of the squares that stand in for it where it has seen too little of what is rare, from the smallest.
+const WIDER: [usize; 3] = [16, 64, 256];
+/// Relative standard error up to which a mean counts as known.
+const KNOWN: f64 = 0.5;
 
 /// A pixel that has been sampled at least twice.
 #[derive(Clone, Copy)]
 pub(super) struct Pixel {
     pub mean: Vec3,
+    /// Half the difference of the means of its halves: as far from zero as `mean` is from right.
+    pub apart: Vec3,
     /// Estimated variance of `mean`.
     pub variance: Vec3,
 }
@@ -36,6 +42,7 @@ pub(super) fn of_pixel(tile: &Tile, pixel: usize) -> Option<Pixel> {
         let difference = even / n - odd / m;
         Pixel {
             mean: ((even + odd) / (n + m)).as_vec3(),
+            apart: (0.5 * difference).as_vec3(),
             variance: (difference * difference * (n * m / ((n + m) * (n + m)))).as_vec3().min(Vec3::MAX),
         }
     })
@@ -45,6 +52,7 @@ pub(super) fn of_pixel(tile: &Tile, pixel: usize) -> Option<Pixel> {
 #[derive(Clone, Copy, Default)]
 struct Window {
     mean: DVec3,
+    apart: DVec3,
     variance: DVec3,
     count: f64,
 }
@@ -53,6 +61,7 @@ impl From<&Option<Pixel>> for Window {
     fn from(pixel: &Option<Pixel>) -> Self {
         pixel.map_or(Window::default(), |p| Window {
             mean: p.mean.as_dvec3(),
+            apart: p.apart.as_dvec3(),
             variance: p.variance.as_dvec3(),
             count: 1.0,
         })
@@ -63,9 +72,75 @@ impl Sum for Window {
     fn sum<I: Iterator<Item = Window>>(windows: I) -> Window {
         windows.fold(Window::default(), |a, b| Window {
             mean: a.mean + b.mean,
+            apart: a.apart + b.apart,
             variance: a.variance + b.variance,
             count: a.count + b.count,
         })
+    }
+}
+
+/// Means of squares of pixels, from which a pixel's own part can be taken out again.
+struct Squares {
+    side: usize,
+    across: usize,
+    windows: Vec<Window>,
+}
+
+impl Squares {
+    fn new(pixels: &[Option<Pixel>], width: usize, side: usize) -> Self {
+        let across = width.div_ceil(side);
+        let of_rows = |rows: &[Option<Pixel>]| {
+            let mut windows = vec![Window::default(); across];
+            for (i, pixel) in rows.iter().enumerate() {
+                let window = &mut windows[i % width / side];
+                *window = [*window, Window::from(pixel)].into_iter().sum();
+            }
+            windows
+        };
+        let windows = pixels.par_chunks(side * width).flat_map_iter(of_rows).collect();
+        Self { side, across, windows }
+    }
+
+    fn around(&self, x: usize, y: usize) -> Window {
+        self.windows[y / self.side * self.across + x / self.side]
+    }
+}
+
+/// What is known of the surroundings of a pixel without it.
+struct Surroundings {
+    mean: DVec3,
+    /// Mean variance of its pixels.
+    variance: DVec3,
+    count: DVec3,
+    /// Whether the mean is known with the pixel's own noise in it: else what it shows is too rare to be judged by so few.
+    is_known: BVec3,
+}
+
+impl Surroundings {
+    fn new(window: Window, pixel: &Pixel) -> Self {
+        let (mean, variance) = (pixel.mean.as_dvec3(), pixel.variance.as_dvec3());
+        let count = (window.count - 1.0).max(1.0);
+        // an only pixel has itself alone; a difference may be below zero by rounding
+        let others = if window.count > 1.0 { ((window.mean - mean) / count).max(DVec3::ZERO) } else { mean };
+        // noise that neighbours share, as a kernel makes it, shows in the halves alone
+        let error = window.variance.powf(0.5).max(window.apart.abs()) / window.count;
+        Self {
+            mean: others,
+            variance: ((window.variance - variance) / count).max(DVec3::ZERO),
+            count: DVec3::splat(count),
+            is_known: error.cmple(KNOWN * others),
+        }
+    }
+
+    /// The same with the channels that are known, and those of a wider one.
+    fn or(self, wider: Self) -> Self {
+        let select = |known, wider| DVec3::select(self.is_known, known, wider);
+        Self {
+            mean: select(self.mean, wider.mean),
+            variance: select(self.variance, wider.variance),
+            count: select(self.count, wider.count),
+            is_known: self.is_known | wider.is_known,
+        }
     }
 }
 
@@ -76,13 +151,15 @@ pub(super) fn scales(pixels: &[Option<Pixel>], width: usize) -> Option<Vec<Vec3>
         pixels.par_chunks(width).map(|row| row.iter().map(Window::from).sum()).collect();
     let known: Window = row_sums.into_iter().sum();
     let floor = (0.01 * known.mean.element_sum() / (3.0 * known.count)).powi(2);
+    let wider = WIDER.map(|side| Squares::new(pixels, width, side));
     let rows = 0..pixels.len() / width;
-    (floor > 0.0)
-        .then(|| rows.into_par_iter().flat_map_iter(|y| row_scales(pixels, width, y, floor)).collect())
+    (floor > 0.0).then(|| {
+        rows.into_par_iter().flat_map_iter(|y| row_scales(pixels, width, y, floor, &wider)).collect()
+    })
 }
 
 /// The same for row `y`.
-fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> Vec<Vec3> {
+fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64, wider: &[Squares]) -> Vec<Vec3> {
     let height = pixels.len() / width;
     let rows = y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(height);
     let column = |x| rows.clone().map(|row| Window::from(&pixels[row * width + x])).sum();
@@ -90,21 +167,24 @@ fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> V
     let scale = |(x, pixel): (usize, &Option<Pixel>)| {
         let Some(pixel) = pixel else { return Vec3::ZERO };
         // plain sums, not running ones: next to a very bright pixel those would keep its rounding error
-        let near = &columns[x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width)];
-        let window: Window = near.iter().copied().sum();
+        let near = columns[x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width)].iter().copied().sum();
+        let found = wider.iter().fold(Surroundings::new(near, pixel), |found, squares| {
+            if found.is_known.all() {
+                found
+            } else {
+                found.or(Surroundings::new(squares.around(x, y), pixel))
+            }
+        });
+        let smooth = found.mean;
         let (mean, variance) = (pixel.mean.as_dvec3(), pixel.variance.as_dvec3());
-        let others = (window.count - 1.0).max(1.0);
-        // an only pixel has itself alone; a difference may be below zero by rounding
-        let smooth = if window.count > 1.0 { ((window.mean - mean) / others).max(DVec3::ZERO) } else { mean };
         let excess = mean - smooth;
         // one pixel's estimate of variance is often far too small
-        let around = ((window.variance - variance) / others).max(DVec3::ZERO);
-        let noise = variance.max(around);
+        let noise = variance.max(found.variance);
         // share of the squared difference that noise does not explain; no difference, nothing to draw back
         let trust = (1.0 - noise / (excess * excess).max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO);
         let truth = smooth + trust * excess;
         // one over the square of a noisy mean is too large by three of its relative variances
-        let convexity = 3.0 * around / others * (1.0 - trust);
+        let convexity = 3.0 * found.variance / found.count * (1.0 - trust);
         (truth * truth + convexity + floor).powf(-0.5).as_vec3()
     };
     pixels[y * width..][..width].iter().enumerate().map(scale).collect()
@@ -113,7 +193,7 @@ fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{ErrorEstimate, Film, PassSet, Sample};
+    use crate::film::{ErrorEstimate, Film, Hints, PassSet, Sample};
     use crate::math::sampler::{hash, hash_unit};
 
     const SIZE: (u32, u32) = (160, 120);
@@ -193,7 +273,10 @@ mod tests {
             let square = truth(x, y).as_dvec3().powf(2.0);
             (square * noise.variance() / count(x, y) as f64 / (square + floor)).element_sum()
         };
-        (film.estimated_error().unwrap().noise, known.iter().map(error).sum::<f64>() / channels)
+        (
+            film.estimated_error(Hints::default()).unwrap().noise,
+            known.iter().map(error).sum::<f64>() / channels,
+        )
     }
 
     fn check(name: &str, truth: fn(u32, u32) -> Vec3, noise: Noise, count: impl Fn(u32, u32) -> u32 + Sync) {
@@ -223,6 +306,16 @@ mod tests {
     }
 
     #[test]
+    fn what_is_rare_is_judged_by_where_else_it_happens() {
+        // a bright sample in one pixel of a dozen
+        for n in [8, 9] {
+            let (estimated, expected) = estimated_and_true(flat, Noise::Fireflies(0.01), |_, _| n);
+            let ratio = estimated / expected;
+            assert!((0.6..1.6).contains(&ratio), "{n}: {estimated}, should be {expected}");
+        }
+    }
+
+    #[test]
     fn edges_and_thin_lines_are_not_smoothed_away() {
         check("edges", edges, Noise::Uniform, |_, _| 16);
         check("edges", edges, Noise::Exponential, |_, _| 64);
@@ -240,16 +333,14 @@ mod tests {
     fn nothing_known_and_nothing_seen() {
         const NONE: Option<ErrorEstimate> = Some(ErrorEstimate { noise: 0.0, bias: None });
         let film = Film::new(40, 40, PassSet::default()).unwrap();
-        assert_eq!(film.estimated_error(), None);
+        assert_eq!(film.estimated_error(Hints::default()), None);
         film.add_iteration(|_, _| Sample::default());
-        assert_eq!(film.estimated_error(), None);
+        assert_eq!(film.estimated_error(Hints::default()), None);
         film.add_iteration(|_, _| Sample::default());
-        assert_eq!(film.estimated_error(), NONE);
-        let biased = NONE.map(|e| e.or_bias(Some(0.5)).or_bias(None).or_bias(Some(0.25)));
-        assert_eq!(biased.map(|e| (e.bias, e.total())), Some((Some(0.5), 0.5)));
+        assert_eq!(film.estimated_error(Hints::default()), NONE);
         let one = Film::new(1, 1, PassSet::default()).unwrap();
         (0..2).for_each(|_| one.add_iteration(|_, _| Sample { radiance: Vec3::ONE, ..Default::default() }));
-        assert_eq!(one.estimated_error(), NONE);
+        assert_eq!(one.estimated_error(Hints::default()), NONE);
     }
 
     #[test]
@@ -259,18 +350,19 @@ mod tests {
             let value = |x| if (x + i) % 2 == 0 { f32::MAX } else { 0.0 };
             film.add_iteration(|x, _| Sample { radiance: Vec3::splat(value(x)), ..Default::default() });
         }
-        assert!(film.estimated_error().unwrap().noise.is_finite());
+        assert!(film.estimated_error(Hints::default()).unwrap().noise.is_finite());
     }
 
     #[test]
     fn a_bright_pixel_leaves_no_trace_beyond_its_neighbourhood() {
-        let pixel =
-            |value, variance| Some(Pixel { mean: Vec3::splat(value), variance: Vec3::splat(variance) });
+        let pixel = |value, variance| {
+            Some(Pixel { mean: Vec3::splat(value), apart: Vec3::ZERO, variance: Vec3::splat(variance) })
+        };
         let mut row = vec![pixel(0.1, 0.01); 40];
         row[..8].fill(None);
-        let without = row_scales(&row, 40, 0, 1e-4);
+        let without = row_scales(&row, 40, 0, 1e-4, &[]);
         row[0] = pixel(1e30, 0.0);
-        assert_eq!(row_scales(&row, 40, 0, 1e-4)[8..], without[8..]);
+        assert_eq!(row_scales(&row, 40, 0, 1e-4, &[])[8..], without[8..]);
     }
 
     #[test]
@@ -284,7 +376,7 @@ mod tests {
         }
         let ask = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| film.estimated_error().unwrap().noise)
+            pool.install(|| film.estimated_error(Hints::default()).unwrap().noise)
         };
         assert_eq!(ask(1).to_bits(), ask(5).to_bits());
     }

@@ -6,7 +6,7 @@ pub mod segment;
 mod shown;
 pub mod vertices;
 
-use crate::film::{Film, Filter, Rect, Sample};
+use crate::film::{Film, Filter, Hints, Rect, Sample};
 use crate::math::Sampler;
 use crate::shading::{CameraRay, Sensor, World};
 use crate::transport::report::Report;
@@ -49,8 +49,8 @@ pub struct Counters {
     pub segments: AtomicU64,
     /// What turned out not to pay and is left out, where an integrator looks.
     pub left_out: Mutex<Option<String>>,
-    /// Relative mean squared error by the kernel's blur, where an integrator knows it.
-    pub blur: Mutex<Option<f64>>,
+    /// What an integrator knows of its systematic error.
+    pub hints: Mutex<Hints>,
     /// Contributions of segments that were not finite and were dropped.
     pub dropped: AtomicU64,
     /// The graph of the segment method, from the last iteration in which it was looked at (its last band).
@@ -124,9 +124,25 @@ impl Context<'_> {
     /// The camera ray of sample `index` of a pixel of the film, and the random numbers of the path that it begins.
     /// Even and odd samples are two independent sequences, as the film's two halves must be.
     pub fn camera_sample(&self, x: u32, y: u32, index: u32) -> (CameraRay, Sampler) {
+        self.camera_ray(x, y, self.seed ^ ((index & 1) << 31), index >> 1)
+    }
+
+    /// Number `k` of up to `most` more such samples, of the same kind and independent of the others.
+    pub fn further_camera_sample(
+        &self,
+        x: u32,
+        y: u32,
+        index: u32,
+        k: u32,
+        most: u32,
+    ) -> (CameraRay, Sampler) {
+        let seed = self.seed ^ GLANCE_STREAM ^ ((index & 1) << 31);
+        self.camera_ray(x, y, seed, (index >> 1).wrapping_mul(most).wrapping_add(k))
+    }
+
+    fn camera_ray(&self, x: u32, y: u32, seed: u32, number: u32) -> (CameraRay, Sampler) {
         let (full_x, full_y) = (x + self.crop.x, y + self.crop.y);
-        let stream = full_y.wrapping_mul(1 << 16) ^ full_x;
-        let mut sampler = Sampler::new(self.seed ^ ((index & 1) << 31), stream, index >> 1);
+        let mut sampler = Sampler::new(seed, full_y.wrapping_mul(1 << 16) ^ full_x, number);
         let centre = Vec2::new(full_x as f32 + 0.5, full_y as f32 + 0.5);
         let film = centre + self.filter.sample(sampler.next_2d());
         let lens = if self.world.needs().depth_of_field { sampler.next_2d() } else { Vec2::ZERO };
@@ -134,6 +150,8 @@ impl Context<'_> {
     }
 }
 
+/// Keeps the random numbers of further camera samples apart from those of the first.
+const GLANCE_STREAM: u32 = 0x91a9_ce00;
 /// Light paths that one task samples.
 const LIGHT_BATCH: u32 = 1024;
 

@@ -11,6 +11,7 @@ use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::economy::{Departure, Economy};
+use crate::transport::glances::{self, Glances};
 use crate::transport::grid::Grid;
 use crate::transport::guiding::{Guiding, Outcome, Start};
 use crate::transport::light::LightSampler;
@@ -68,8 +69,12 @@ pub struct Segment {
     starts: Vec<u32>,
     /// The kernel's size place by place.
     adaptation: Adaptation,
+    /// How often pixels look for light on their primary segments.
+    glances: Glances,
     /// How many light paths pay.
     economy: Economy,
+    /// How much of the light is beyond the camera's own paths, see [`Reflected::beyond_own_paths`].
+    beyond: f64,
     /// For every band, the picture before the last iteration that looked whether they do.
     yardsticks: Vec<Shown>,
 }
@@ -98,6 +103,7 @@ impl Integrator for Segment {
         *self = Self {
             guiding: take(&mut self.guiding),
             adaptation: take(&mut self.adaptation),
+            glances: take(&mut self.glances),
             economy: take(&mut self.economy),
             yardsticks: take(&mut self.yardsticks),
             ..Self::new(self.techniques)
@@ -120,6 +126,7 @@ impl Segment {
     /// An iteration: light paths, and band by band the camera paths that they are joined to. Returns `false` if it was
     /// stopped.
     fn all_bands(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
+        let rays_before = context.counters.rays.load(Relaxed);
         let bands = self.bands(context);
         let all = self.most_light_paths(context);
         let light_paths = match self.is_thrifty(context) {
@@ -142,10 +149,12 @@ impl Segment {
             self.yardsticks.clear();
         }
         let mut deviation = 0.0;
+        self.beyond = 0.0;
         let adapts = self.techniques.kernel.adapts();
         if adapts {
-            self.adaptation.begin(context.crop);
+            self.adaptation.begin(context.crop, context.completed + 1);
         }
+        self.glances.begin(context.crop, context.world.needs().mirrors);
         for (k, band) in bands.into_iter().enumerate() {
             let crop = Rect { x: context.crop.x + band.x, y: context.crop.y + band.y, ..band };
             let of_band = Context { crop, ..*context };
@@ -154,6 +163,7 @@ impl Segment {
             }
             let before = if compares { Shown::of(context.film, band) } else { None };
             self.gather(&of_band, band);
+            self.count_glances(&of_band);
             costs.stage("gather", self.primaries.capacity() * size_of::<Primary>());
             if adapts {
                 self.adapt(&of_band, cut);
@@ -177,8 +187,15 @@ impl Segment {
             let done = context.completed + 1;
             let [nominal, next] = [done - 1, done].map(|i| self.techniques.kernel.edge(i));
             self.adaptation.end_iteration(nominal, next, done);
-            *locked(&context.counters.blur) = self.adaptation.blur();
+            locked(&context.counters.hints).blur = self.adaptation.blur();
             costs.stage("adaptation", 0);
+        }
+        let rays = context.counters.rays.load(Relaxed) - rays_before;
+        self.glances.end_iteration(context.completed + 1, rays);
+        costs.stage("adaptation", self.glances.bytes());
+        if (index + 1).is_power_of_two() && self.techniques.camera_paths {
+            let share = self.beyond / context.crop.area() as f64;
+            locked(&context.counters.hints).beyond_unfiltered = share;
         }
         if lessons.guides {
             self.guiding.finish_iteration(context.world, cut);
@@ -303,6 +320,9 @@ impl Segment {
             };
             let report = self.reflected.report(sampled, &self.weights, &self.starts, sweeps, cut);
             *locked(&context.counters.graph) = Some(report);
+            if self.techniques.camera_paths {
+                self.beyond += self.reflected.beyond_own_paths(sampled, &self.weights, &self.starts, cut);
+            }
             costs.stage("report", 0);
         }
         solved
@@ -321,7 +341,15 @@ impl Segment {
         };
         let rows = context.camera_rows(|x, y, (store, primaries): &mut (CameraStore, Vec<Primary>), rays| {
             let (ray, mut random) = context.camera_sample(x, y, index);
-            primaries.push(sampler.path(&ray, &mut random, store, rays));
+            let mut primary = sampler.path(&ray, &mut random, store, rays);
+            let more = 1..self.glances.number(x + context.crop.x, y + context.crop.y);
+            if !more.is_empty() {
+                primary.average(more.map(|k| {
+                    let (ray, mut random) = context.further_camera_sample(x, y, index, k, glances::MOST);
+                    sampler.glance(&ray, &mut random, rays)
+                }));
+            }
+            primaries.push(primary);
         });
         if cut.is_raised() {
             return false;
@@ -400,13 +428,17 @@ impl Segment {
         if lessons.guides { self.guiding.learn(outcome, cut) } else { 0 }
     }
 
+    /// Takes note of how the light on primary segments varies, and of all else that a band shows.
+    fn count_glances(&mut self, context: &Context) {
+        let Self { samples, bridges, reflected, primaries, glances, .. } = self;
+        let sampled = samples.with(context.world, self.techniques.bridges.map(|_| &*bridges));
+        glances.add(context.crop, primaries, |p| p.weight * seen(reflected, sampled, p));
+    }
+
     /// Takes note of what a band shows, from which the kernel's sizes follow.
     fn adapt(&mut self, context: &Context, cut: &Cut) {
         let sampled = self.samples.with(context.world, self.techniques.bridges.map(|_| &self.bridges));
-        let light = |p: &Primary| {
-            let reflected = p.arrival.map(|a| self.reflected.towards_camera(sampled, a as usize));
-            luminance(reflected.unwrap_or(Vec3::ZERO)) / p.albedo
-        };
+        let light = |p: &Primary| luminance(seen(&self.reflected, sampled, p)) / p.albedo;
         let look = Look {
             band: context.crop,
             sensor: context.sensor,
@@ -448,4 +480,9 @@ impl Segment {
         });
         (context.tile_done)(band);
     }
+}
+
+/// Basic radiance that is reflected at the end of a primary segment.
+fn seen(reflected: &Reflected, sampled: Sampled, primary: &Primary) -> Vec3 {
+    primary.arrival.map_or(Vec3::ZERO, |a| reflected.towards_camera(sampled, a as usize))
 }

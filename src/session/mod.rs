@@ -319,8 +319,8 @@ impl Session {
         }
         state.next_curve_point = state.seconds * CURVE_RATIO;
         let enough = state.iterations >= MIN_SAMPLES_FOR_ERROR;
-        let estimate = enough.then(|| self.pool.install(|| self.film.estimated_error())).flatten();
-        let estimate = estimate.map(|e| e.or_bias(*locked(&self.counters.blur)));
+        let hints = *locked(&self.counters.hints);
+        let estimate = enough.then(|| self.pool.install(|| self.film.estimated_error(hints))).flatten();
         state.error = estimate.or(state.error);
         let point = CurvePoint {
             seconds: state.seconds,

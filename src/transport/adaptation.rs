@@ -4,13 +4,13 @@
 //! arrives at the surfaces, in two halves: the iterations of even and of odd number. Their difference tells the noise,
 //! whose variance goes like one over the kernel's area. What a kernel of some size *would* blur is found by
 //! filtering that picture: grouped as the grid groups arrivals, the mean of a voxel less its pixel's own value, times the
-//! same of the other half. Noise of the halves is independent, so the product is on average the squared difference alone.
-//! In every block of pixels the size counts for which the sum of both is least.
+//! same of the other half and of another grid. Noise of the halves is independent, so the product is on average the squared
+//! difference alone, and what one grid does and another does not is noise, too. In every block of pixels the size counts for which the sum of both is least.
 
 use super::Cut;
 use super::camera::Primary;
 use super::grid::Grid;
-use super::sizes::{BLOCK, Sizes, blocks};
+use super::sizes::{BLOCK, Sizes, block, blocks};
 use super::store::Arrival;
 use crate::film::Rect;
 use crate::math::sampler::hash;
@@ -35,6 +35,9 @@ const LEAST_SHARE: f64 = 0.1;
 /// Cosine between normals of neighbouring pixels above which the surface goes on.
 const SMOOTH: f32 = 0.8;
 
+/// For every candidate.
+type PerSize = [f64; CANDIDATES.len()];
+
 /// What a block of pixels tells.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
@@ -42,33 +45,41 @@ struct Evidence {
     pixels: f64,
     /// Sum of the relative variances of their means.
     noise: f64,
-    /// Sums of the relative squared differences that each candidate would make.
-    blur: [f64; CANDIDATES.len()],
+    /// Sums of the relative squared differences that each candidate would make in the mean over its random grids: what
+    /// the picture keeps of them.
+    blur: PerSize,
+    /// The same of a single grid, which is more: iterations average that away.
+    of_one_grid: PerSize,
 }
 
 impl Evidence {
-    /// Squared differences, counted as they are judged, that a kernel makes of so many octaves over a pixel.
-    fn blur_of(&self, octaves: f32) -> f64 {
-        let last = CANDIDATES.len() - 1;
-        let at = (octaves - CANDIDATES[0]).clamp(0.0, CANDIDATES[last]);
-        let below = (at as usize).min(last - 1);
-        let [low, high] = [self.blur[below], self.blur[below + 1]];
-        BLUR * (low + f64::from(at - CANDIDATES[below]) * (high - low))
-    }
-
     /// The candidate of least error for as many iterations as there were, over which the sum of the reciprocal squared
     /// sizes was `densities`; `None` where too little is known.
     fn best(&self, completed: u32, densities: f64) -> Option<f32> {
         if self.pixels < LEAST_SHARE * f64::from(BLOCK * BLOCK) {
             return None;
         }
+        let completed = f64::from(completed);
         // of a kernel of one pixel
-        let noise = self.noise * f64::from(completed) / densities;
-        let error =
-            |k: usize| BLUR * self.blur[k].max(0.0) + noise * f64::from(CANDIDATES[k]).exp2().powi(-2);
+        let noise = self.noise * completed / densities;
+        let error = |k: usize| {
+            let of_grids = (self.of_one_grid[k] - self.blur[k]).max(0.0) / completed;
+            BLUR * self.blur[k].max(0.0) + of_grids + noise * f64::from(CANDIDATES[k]).exp2().powi(-2)
+        };
         let best = (0..CANDIDATES.len()).min_by(|&a, &b| error(a).total_cmp(&error(b)))?;
         error(best).is_finite().then_some(CANDIDATES[best])
     }
+}
+
+/// How much each candidate has of a size between two of them.
+fn shares(octaves: f32) -> PerSize {
+    let last = CANDIDATES.len() - 1;
+    let at = (octaves - CANDIDATES[0]).clamp(0.0, CANDIDATES[last]);
+    let below = (at as usize).min(last - 1);
+    let above = f64::from(at - CANDIDATES[below]);
+    let mut shares = [0.0; CANDIDATES.len()];
+    (shares[below], shares[below + 1]) = (1.0 - above, above);
+    shares
 }
 
 /// What is known of the picture, and the sizes that follow from it.
@@ -80,9 +91,10 @@ pub struct Adaptation {
     /// For every block, octaves over the nominal size, and the sum over all iterations of the reciprocal squared size.
     octaves: Vec<f32>,
     densities: Vec<f64>,
+    /// For every block, iterations by candidate, and what was last found out.
+    used: Vec<PerSize>,
     evidence: Vec<Evidence>,
     sizes: Sizes,
-    blur: Option<f64>,
 }
 
 /// A band of the picture after an iteration.
@@ -103,8 +115,8 @@ pub struct Look<'a> {
 }
 
 impl Adaptation {
-    /// Begins a picture, a part of the full film, unless it has begun already.
-    pub fn begin(&mut self, picture: Rect) {
+    /// Begins an iteration, after which `completed` are, of a picture that is a part of the full film.
+    pub fn begin(&mut self, picture: Rect, completed: u32) {
         if self.picture != picture {
             let count = blocks(picture).into_iter().product();
             *self = Self {
@@ -112,10 +124,13 @@ impl Adaptation {
                 shown: vec![[0.0; 2]; picture.area()],
                 octaves: vec![0.0; count],
                 densities: vec![0.0; count],
+                used: vec![PerSize::default(); count],
                 evidence: vec![Evidence::default(); count],
                 sizes: Sizes::default(),
-                blur: None,
             };
+        }
+        if chooses(completed) {
+            self.evidence.fill(Evidence::default());
         }
     }
 
@@ -124,9 +139,16 @@ impl Adaptation {
         &self.sizes
     }
 
-    /// Relative mean squared error that the kernels make by what they blur, as it was found when sizes were last chosen.
+    /// Relative mean squared error that the kernels of the iterations so far make by what they blur, as far as it was known when
+    /// sizes were last chosen; a little too much where they were of several sizes.
     pub fn blur(&self) -> Option<f64> {
-        self.blur
+        let pixels = self.evidence.iter().map(|e| e.pixels).sum::<f64>();
+        let of_block = |(e, used): (&Evidence, &PerSize)| {
+            let all = used.iter().sum::<f64>();
+            e.blur.iter().zip(used).map(|(blur, n)| blur * n / all).sum::<f64>()
+        };
+        let sum = self.evidence.iter().zip(&self.used).map(of_block).sum::<f64>();
+        (pixels > 0.0).then(|| sum.max(0.0) / pixels).filter(|b| b.is_finite())
     }
 
     /// Memory, bytes.
@@ -162,50 +184,63 @@ impl Adaptation {
         let floor = DARK * (all / clear.len().max(1) as f64) as f32;
         let mut scales = vec![0.0f32; means.len()];
         let mut keys = Vec::new();
+        // of two independent grids
+        let mut differences = [vec![[0.0f32; 2]; means.len()], vec![[0.0f32; 2]; means.len()]];
         for k in std::iter::once(JUDGE).chain((0..CANDIDATES.len()).filter(|&k| k != JUDGE)) {
             if cut.is_raised() {
                 return;
             }
-            let grid = Grid::new(sensor, CANDIDATES[k].exp2(), hash(seed, k as u32));
-            keys.clear();
-            keys.par_extend(clear.par_iter().map(|&(pixel, a)| (grid.key(&arrivals[a as usize]), pixel)));
-            // pixels make the order unique, so it does not depend on the threads
-            keys.par_sort_unstable();
-            for voxel in keys.chunk_by(|a, b| a.0 == b.0) {
-                let pixels = voxel.iter().map(|&(_, pixel)| pixel as usize);
-                let sum = pixels.clone().fold([0.0; 2], |s, i| [s[0] + means[i][0], s[1] + means[i][1]]);
-                let mean = sum.map(|s| s / voxel.len() as f32);
-                for i in pixels {
-                    let evidence = &mut self.evidence[block(self.picture, band, i)];
-                    if k == JUDGE {
-                        scales[i] = 1.0 / (middle(mean) + floor).max(f32::MIN_POSITIVE);
-                        evidence.pixels += 1.0;
-                        evidence.noise += f64::from(0.5 * (means[i][0] - means[i][1]) * scales[i]).powi(2);
+            for (g, of_grid) in differences.iter_mut().enumerate() {
+                let seed = hash(seed, (2 * k + g) as u32);
+                let grid = Grid::new(sensor, CANDIDATES[k].exp2(), seed);
+                keys.clear();
+                keys.par_extend(clear.par_iter().map(|&(pixel, a)| (grid.key(&arrivals[a as usize]), pixel)));
+                // pixels make the order unique, so it does not depend on the threads
+                keys.par_sort_unstable();
+                for voxel in keys.chunk_by(|a, b| a.0 == b.0) {
+                    let pixels = voxel.iter().map(|&(_, pixel)| pixel as usize);
+                    let sum = pixels.clone().fold([0.0; 2], |s, i| [s[0] + means[i][0], s[1] + means[i][1]]);
+                    let mean = sum.map(|s| s / voxel.len() as f32);
+                    for i in pixels {
+                        if k == JUDGE && g == 0 {
+                            scales[i] = 1.0 / (middle(mean) + floor).max(f32::MIN_POSITIVE);
+                        }
+                        of_grid[i] = [0, 1].map(|half| (mean[half] - means[i][half]) * scales[i]);
                     }
-                    let difference = |half: usize| f64::from((mean[half] - means[i][half]) * scales[i]);
-                    evidence.blur[k] += difference(0) * difference(1);
                 }
+            }
+            let product = |a: f32, b: f32| f64::from(a) * f64::from(b);
+            for &(pixel, _) in &clear {
+                let i = pixel as usize;
+                let (x, y) = (band.x + pixel % band.width, band.y + pixel / band.width);
+                let evidence = &mut self.evidence[block(self.picture, x, y)];
+                if k == JUDGE {
+                    evidence.pixels += 1.0;
+                    evidence.noise += f64::from(0.5 * (means[i][0] - means[i][1]) * scales[i]).powi(2);
+                }
+                let [a, b] = [differences[0][i], differences[1][i]];
+                evidence.blur[k] += 0.5 * (product(a[0], b[1]) + product(a[1], b[0]));
+                evidence.of_one_grid[k] += 0.5 * (product(a[0], a[1]) + product(b[0], b[1]));
             }
         }
     }
 
     /// Ends an iteration of some nominal size in pixels, after which `completed` are; `next` is that of the next one.
     pub fn end_iteration(&mut self, nominal: f32, next: f32, completed: u32) {
-        for (density, octaves) in self.densities.iter_mut().zip(&self.octaves) {
+        let of_blocks = self.densities.iter_mut().zip(&mut self.used).zip(&self.octaves);
+        for ((density, used), octaves) in of_blocks {
             *density += f64::from(nominal * octaves.exp2()).powi(-2);
+            let shares = shares(nominal.log2() + octaves);
+            used.iter_mut().zip(shares).for_each(|(used, share)| *used += share);
         }
         if !chooses(completed) {
             return;
         }
-        let made = self.evidence.iter().zip(&self.octaves).map(|(e, o)| e.blur_of(nominal.log2() + o));
-        let pixels = self.evidence.iter().map(|e| e.pixels).sum::<f64>();
-        self.blur = (pixels > 0.0).then(|| made.sum::<f64>().max(0.0) / pixels).filter(|b| b.is_finite());
         // never below a pixel for its own sake: the pixel filter blurs as much
         let least = (-next.log2()).min(0.0);
-        for ((evidence, density), octaves) in
-            self.evidence.iter_mut().zip(&self.densities).zip(&mut self.octaves)
+        for ((evidence, density), octaves) in self.evidence.iter().zip(&self.densities).zip(&mut self.octaves)
         {
-            let best = std::mem::take(evidence).best(completed, *density);
+            let best = evidence.best(completed, *density);
             *octaves = best.map_or(0.0, |best| (best - next.log2()).clamp(least, MOST));
         }
         self.sizes = Sizes::new(self.picture, self.octaves.clone());
@@ -220,14 +255,6 @@ fn chooses(completed: u32) -> bool {
 /// Mean of two halves.
 fn middle(halves: [f32; 2]) -> f32 {
     0.5 * (halves[0] + halves[1])
-}
-
-/// The block of a band's pixel.
-fn block(picture: Rect, band: Rect, pixel: usize) -> usize {
-    let (x, y) = (pixel as u32 % band.width, pixel as u32 / band.width);
-    let (x, y) = (band.x - picture.x + x, band.y - picture.y + y);
-    let [across, _] = blocks(picture);
-    (y / BLOCK) as usize * across + (x / BLOCK) as usize
 }
 
 /// Pixels around which the surface goes on, so that what they show is that of one place, with their arrivals.

@@ -38,6 +38,13 @@ pub struct Primary {
     pub mirrored: Vec3,
     /// Coverage.
     pub alpha: f32,
+    /// Primary segments of which the lights are means, the sum of the squared luminances of their `light`, and the rays that
+    /// they took.
+    pub glances: u32,
+    /// See `glances`.
+    pub square: f32,
+    /// See `glances`.
+    pub rays: u32,
     /// The first surface on it.
     pub first_hit: Option<FirstHit>,
 }
@@ -54,8 +61,24 @@ impl Primary {
         emission: Vec3::ZERO,
         mirrored: Vec3::ZERO,
         alpha: 1.0,
+        glances: 0,
+        square: 0.0,
+        rays: 0,
         first_hit: None,
     };
+
+    /// Takes the light of others into its means.
+    pub fn average(&mut self, others: impl Iterator<Item = Self>) {
+        let mut sums = [self.light, self.emission, self.mirrored].map(|v| v * self.glances as f32);
+        for o in others {
+            let more = [o.light, o.emission, o.mirrored].map(|v| v * o.glances as f32);
+            sums = std::array::from_fn(|k| sums[k] + more[k]);
+            self.glances += o.glances;
+            self.square += o.square;
+            self.rays += o.rays;
+        }
+        [self.light, self.emission, self.mirrored] = sums.map(|v| v / self.glances as f32);
+    }
 }
 
 /// Samples camera paths.
@@ -190,10 +213,7 @@ impl CameraSampler<'_> {
         store: &mut CameraStore,
         rays: &mut u64,
     ) -> Primary {
-        let mut primary = Primary::NOTHING;
-        let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: true };
-        let mut seeing = Seeing { sampler: self, primary: &mut primary };
-        let (chain, end) = follow.segment(Piece::from_camera(ray), sampler, &mut seeing, rays);
+        let (mut primary, chain, end) = self.primary(ray, sampler, rays);
         let Some(mut end) = end else { return primary };
         let first = store.arrivals.len();
         primary.arrival = Some(first as u32);
@@ -204,7 +224,7 @@ impl CameraSampler<'_> {
             chain.forward * place.normal.dot(end.wo).abs() * self.sensor.density(ray, place.position);
         let mut inverse_n2 = 1.0 / (chain.index * chain.index);
         let mut own = OwnPath::new(chain.passages, self.max_depth);
-        let follow = Follow { from_camera: false, ..follow };
+        let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: false };
         loop {
             let index = store.arrivals.len();
             let sight = end.sight();
@@ -280,6 +300,27 @@ impl CameraSampler<'_> {
         }
         primary.unfiltered = own.light;
         primary
+    }
+
+    /// What is seen on a primary segment alone.
+    pub fn glance(&self, ray: &CameraRay, sampler: &mut Sampler, rays: &mut u64) -> Primary {
+        self.primary(ray, sampler, rays).0
+    }
+
+    fn primary(
+        &self,
+        ray: &CameraRay,
+        sampler: &mut Sampler,
+        rays: &mut u64,
+    ) -> (Primary, Chain, Option<End>) {
+        let mut primary = Primary { glances: 1, ..Primary::NOTHING };
+        let before = *rays;
+        let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: true };
+        let mut seeing = Seeing { sampler: self, primary: &mut primary };
+        let (chain, end) = follow.segment(Piece::from_camera(ray), sampler, &mut seeing, rays);
+        primary.square = luminance(primary.light).powi(2);
+        primary.rays = (*rays - before) as u32;
+        (primary, chain, end)
     }
 
     /// A next-event segment along which light arrives, and the value of the lobes.

@@ -10,6 +10,7 @@ pub mod cluster;
 pub mod depth;
 pub mod economy;
 mod exchange;
+pub mod glances;
 pub mod grid;
 pub mod guiding;
 pub mod kernel;

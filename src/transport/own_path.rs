@@ -3,9 +3,17 @@
 //! Filtering blurs, and whatever else is only nearly right about clusters shows in the picture as well. This estimate
 //! knows nothing of them, so its mean difference from the filtered one is the systematic error.
 
-use super::store::{EmissionHit, NextEvent};
+use super::Cut;
+use super::photons::{gather_photons, photon_values, photon_weight};
+use super::propagate::Reflected;
+use super::store::{EmissionHit, NextEvent, Rivals};
 use super::walk::Chain;
+use super::weigh::{Sampled, Weights};
+use crate::math::luminance;
 use glam::Vec3;
+
+/// Weight above which photons find what a camera path meets so rarely that its mean says nothing.
+const HARDLY_MET: f32 = 0.9;
 
 /// The light of one path so far.
 #[derive(Clone, Copy, Debug)]
@@ -56,5 +64,29 @@ impl OwnPath {
         if light.is_finite() {
             self.light += light;
         }
+    }
+}
+
+impl Reflected {
+    /// How much of the light these arrivals reflect is beyond their own paths, squared as a share and summed: photons bring it
+    /// straight from lights through Dirac lobes, and camera segments hardly ever meet those lights.
+    pub fn beyond_own_paths(&self, s: Sampled, w: &Weights, arrivals: &[u32], cut: &Cut) -> f64 {
+        let mut values = photon_values(s, w);
+        for (j, value) in values.iter_mut().enumerate() {
+            let is_straight = match s.light.photons[j].rivals {
+                Rivals::First { next_event_pdf, .. } => next_event_pdf == 0.0,
+                Rivals::Later { .. } => false,
+            };
+            if *value != Vec3::ZERO && !(is_straight && photon_weight(s, w, j) > HARDLY_MET) {
+                *value = Vec3::ZERO;
+            }
+        }
+        let beyond = gather_photons(s, w, &self.segments, &values, cut, |_| true);
+        let square = |&i: &u32| {
+            let i = i as usize;
+            let share = luminance(beyond[i].reflected) / luminance(self.towards_camera(s, i));
+            if share.is_finite() { f64::from(share.clamp(0.0, 1.0)).powi(2) } else { 0.0 }
+        };
+        arrivals.iter().map(square).sum()
     }
 }

@@ -20,6 +20,12 @@ pub fn blocks(picture: Rect) -> [usize; 2] {
     [picture.width, picture.height].map(|side| side.div_ceil(BLOCK) as usize)
 }
 
+/// The block of a pixel of the full film, which must lie in the picture.
+pub fn block(picture: Rect, x: u32, y: u32) -> usize {
+    let [across, _] = blocks(picture);
+    ((y - picture.y) / BLOCK) as usize * across + ((x - picture.x) / BLOCK) as usize
+}
+
 impl Sizes {
     /// Of the blocks of a part of the full film, row by row.
     pub fn new(picture: Rect, octaves: Vec<f32>) -> Self {
