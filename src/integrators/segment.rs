@@ -256,7 +256,7 @@ impl Segment {
         costs.stage("areas", 0);
         self.octaves.clear();
         self.octaves.extend(self.primaries.iter().map(|p| match p.arrival {
-            Some(a) => grid.octaves(self.samples.camera.arrivals[a as usize].position),
+            Some(a) => grid.octaves(self.samples.camera.arrivals.get(a as usize).position),
             None => 0.0,
         }));
         context.counters.segments.fetch_max(self.segments() as u64, Relaxed);
@@ -329,6 +329,7 @@ impl Segment {
         self.samples.camera.clear();
         self.primaries.clear();
         self.starts.clear();
+        self.samples.camera.reserve(rows.iter().map(|r| &r.0));
         for (mut store, primaries) in rows {
             let first = self.samples.camera.append(&mut store);
             for mut p in primaries {
@@ -354,6 +355,7 @@ impl Segment {
             sampler.path(k, &mut Sampler::new(context.seed ^ LIGHT_STREAM, k, index), store, rays);
         });
         self.samples.light.clear();
+        self.samples.light.reserve(batches.iter());
         batches.into_iter().for_each(|mut store| self.samples.light.append(&mut store));
         !cut.is_raised()
     }

@@ -46,14 +46,10 @@ impl Cell<'_> {
     }
 
     /// The exact area where the whole cut lies on one triangle and so do all `members`.
-    pub fn on_one_triangle<'m>(
-        &self,
-        world: &World,
-        mut members: impl Iterator<Item = &'m Arrival>,
-    ) -> Option<f32> {
+    pub fn on_one_triangle(&self, world: &World, mut members: impl Iterator<Item = Arrival>) -> Option<f32> {
         let r = self.representative;
         let triangle = |a: &Arrival| (a.at.instance, a.at.triangle);
-        if self.parted.is_some() || !members.all(|a| triangle(a) == triangle(r)) {
+        if self.parted.is_some() || !members.all(|a| triangle(&a) == triangle(r)) {
             return None;
         }
         let (low, edge) = self.grid.place(&self.voxel);

@@ -205,6 +205,7 @@ impl CameraSampler<'_> {
         let mut inverse_n2 = 1.0 / (chain.index * chain.index);
         let mut own = OwnPath::new(chain.passages, self.max_depth);
         let follow = Follow { from_camera: false, ..follow };
+        let mut met = Vec::new();
         loop {
             let index = store.arrivals.len();
             let sight = end.sight();
@@ -229,25 +230,22 @@ impl CameraSampler<'_> {
             store.dropped += u64::from(!sound);
             let next_event = if sound { next_event } else { NextEvent::default() };
             own.see_next_event(&next_event, arrived.survival, value);
-            store.next_events.push(next_event);
-            store.inverse_n2.push(inverse_n2);
             let u = sampler.next_3d();
             let goes_on = sampler.next_1d() < arrived.survival;
             let sample = if goes_on { sight.and_then(|s| s.sample(Walk::Camera, u)) } else { None };
             arrived.goes_on = sample.is_some();
             let survival = arrived.survival;
-            store.arrivals.push(arrived);
             let Some(sample) = sample else {
-                store.outgoing.push(Outgoing::default());
+                store.push(arrived, inverse_n2, next_event, Outgoing::default());
                 break;
             };
             let direction = sample.direction;
             let start_n2 = inverse_n2 / (sample.eta * sample.eta);
             let light_end = end.probability_from(self.world, direction);
-            let met = store.hits.len();
+            met.clear();
             let mut meeting = Meeting {
                 world: self.world,
-                hits: &mut store.hits,
+                hits: &mut met,
                 dropped: &mut store.dropped,
                 arrival: index as u32,
                 receiver,
@@ -260,10 +258,11 @@ impl CameraSampler<'_> {
             let piece = Piece::leaving(&end.hit, direction);
             let (chain, next) = follow.segment(piece, sampler, &mut meeting, rays);
             let density = survival * sample.pdf.value();
-            own.meet(&store.hits[met..], sample.value, density);
+            own.meet(&met, sample.value, density);
+            met.drain(..).for_each(|hit| store.hits.push(hit));
             own.go_on(&chain, sample.value, density);
             let squeeze = 1.0 / (chain.index * chain.index);
-            store.outgoing.push(Outgoing {
+            let outgoing = Outgoing {
                 direction,
                 pdf: sample.pdf.value(),
                 throughput: chain.throughput,
@@ -271,7 +270,8 @@ impl CameraSampler<'_> {
                 reverse: chain.reverse * light_end,
                 squeeze,
                 passages: chain.passages,
-            });
+            };
+            store.push(arrived, inverse_n2, next_event, outgoing);
             match next {
                 Some(e) => end = e,
                 None => break,

@@ -3,7 +3,7 @@
 use super::Cut;
 use super::area::{Cell, FEW_POINTS, MOST_POINTS, POINTS_OF_PHOTONS};
 use super::grid::Grid;
-use super::store::Arrival;
+use super::store::{Arrival, Arrivals};
 use super::unseen::{self, UNSEEN};
 use crate::math::sampler::hash;
 use crate::shading::{SurfaceClass, World};
@@ -104,17 +104,17 @@ pub struct Clusters {
 #[derive(Clone, Copy)]
 pub struct Numbered<'a> {
     /// The camera's.
-    pub camera: &'a [Arrival],
+    pub camera: &'a Arrivals,
     /// The lights'.
-    pub light: &'a [Arrival],
+    pub light: &'a Arrivals,
 }
 
-impl<'a> Numbered<'a> {
+impl Numbered<'_> {
     /// Arrival number `i`.
     #[inline]
-    pub fn get(&self, i: u32) -> &'a Arrival {
+    pub fn get(&self, i: u32) -> Arrival {
         let i = i as usize;
-        if i < self.camera.len() { &self.camera[i] } else { &self.light[i - self.camera.len()] }
+        if i < self.camera.len() { self.camera.get(i) } else { self.light.get(i - self.camera.len()) }
     }
 
     fn len(&self) -> usize {
@@ -143,7 +143,7 @@ impl Clusters {
     ) -> bool {
         let n = all.len();
         self.keys.clear();
-        self.keys.par_extend((0..n as u32).into_par_iter().map(|i| (grid.key(all.get(i)), i)));
+        self.keys.par_extend((0..n as u32).into_par_iter().map(|i| (grid.key(&all.get(i)), i)));
         if cut.is_raised() {
             return false;
         }
@@ -158,7 +158,7 @@ impl Clusters {
             .par_iter()
             .with_min_len(GRAIN)
             .flat_map_iter(|group| {
-                let hub = Hub::new(grid, all.get(group[0].1));
+                let hub = Hub::new(grid, &all.get(group[0].1));
                 // the representative sees itself
                 let others = group[1..].iter().map(move |&(_, i)| {
                     let a = all.get(i);
@@ -300,8 +300,8 @@ fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut C
     if areas == Areas::None {
         return 0;
     }
-    let cell = Cell { grid, voxel, representative, parted: c.parted };
-    let hub = Hub::new(grid, representative);
+    let cell = Cell { grid, voxel, representative: &representative, parted: c.parted };
+    let hub = Hub::new(grid, &representative);
     let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)));
     let mut probes = 0;
     let mut estimate = |points: u32| {

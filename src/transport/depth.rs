@@ -48,7 +48,7 @@ impl<T> Levels<T> {
 
 /// Most passages of a segment of the camera's paths; `first` as in [`Reflected::solve_limited`].
 pub(super) fn longest_chain(s: Sampled, first: &[(u32, u32)]) -> u32 {
-    s.camera.outgoing.iter().map(|o| o.passages).chain(first.iter().map(|f| f.1)).max().unwrap_or(0)
+    first.iter().map(|f| f.1).fold(s.camera.outgoing.most_passages(), u32::max)
 }
 
 impl Reflected {
@@ -76,7 +76,7 @@ impl Reflected {
             let brought = per_index(s, |i| {
                 // light met after k passages has bounced once more on its way
                 let met = emitted(s, w, i, Some(k - 1));
-                let level = levels.back(s.camera.outgoing[i].passages).filter(|_| has_end(s, i));
+                let level = levels.back(s.camera.outgoing.get(i).passages).filter(|_| has_end(s, i));
                 self.segments[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1].brought)))
             });
             let photons = gather_photons(s, w, &self.segments, &values, cut, |bounces| bounces < k);

@@ -219,7 +219,7 @@ fn of_cluster(o: Outcome, k: usize, worth: &[Vec3]) -> PerShare {
     let photons: Vec<Item> = s
         .lights(c)
         .map(|j| {
-            let photon = &s.light.photons[j];
+            let photon = s.light.photons.get(j);
             let counts = o.max_depth.is_none_or(|most| photon.bounces < most);
             let share = photon_weight(s, o.weights, j);
             let flux = if counts { photon.flux } else { Vec3::ZERO };
@@ -239,28 +239,27 @@ fn of_cluster(o: Outcome, k: usize, worth: &[Vec3]) -> PerShare {
     match c.class {
         SurfaceClass::Diffuse => {
             // all arrivals reflect alike: one row, and how much its square counts
-            let reflected = |i: usize| f64::from((worth[i] * s.camera.arrivals[i].reflectance).element_sum());
+            let reflected =
+                |i: usize| f64::from((worth[i] * s.camera.arrivals.get(i).reflectance).element_sum());
             let scale: f64 = s.cameras(c).map(|i| reflected(i).powi(2)).sum();
             let grey = Vec3::splat(1.0 / 3.0);
             let (camera, light): (Vec<usize>, Vec<usize>) = (s.cameras(c).collect(), s.lights(c).collect());
             let row = |column: usize| {
                 let i = camera[column];
-                [grey * s.camera.next_events[i].pdf, grey * s.camera.outgoing[i].pdf]
+                let next_event = s.camera.next_events.get(i).map_or(0.0, |n| n.pdf);
+                [grey * next_event, grey * s.camera.outgoing.pdf(i)]
             };
-            add(scale, &row, &|column| grey * s.light.arrivals[light[column]].back_pdf);
+            add(scale, &row, &|column| grey * s.light.arrivals.get(light[column]).back_pdf);
         }
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
             let camera: Vec<usize> = s.cameras(c).collect();
             for (r, &i) in camera.iter().enumerate().filter(|&(_, &i)| worth[i] != Vec3::ZERO) {
-                let a = &s.camera.arrivals[i];
+                let a = s.camera.arrivals.get(i);
                 let bsdf: Bsdf = a.bsdf(s.world);
                 let f = o.weights.row(k, r);
                 let row = |column: usize| {
-                    let next_event = &s.camera.next_events[camera[column]];
-                    let lit = match next_event.next_event_pdf > 0.0 {
-                        true => bsdf.eval(a.wo, next_event.direction),
-                        false => Vec3::ZERO,
-                    };
+                    let next_event = s.camera.next_events.get(camera[column]);
+                    let lit = next_event.map_or(Vec3::ZERO, |n| bsdf.eval(a.wo, n.direction));
                     [worth[i] * lit, worth[i] * f[column]]
                 };
                 add(1.0, &row, &|column| worth[i] * f[camera.len() + column]);
@@ -279,17 +278,16 @@ fn value(item: &Item, lobe: Vec3) -> (f64, f64) {
 fn draws(o: Outcome, i: usize) -> Draws {
     let (s, w): (Sampled, &Weights) = (o.sampled, o.weights);
     let c = s.cluster_of(i);
-    let next_event = &s.camera.next_events[i];
     let segment: &Segment = &o.reflected.segments[i];
     let mut draws = Draws::default();
-    if next_event.next_event_pdf > 0.0 {
+    if let Some(next_event) = s.camera.next_events.get(i) {
         // the densities of the cluster's lobes along it are those of its own, as far as they are alike
-        let p_cam = c.cameras as f32 * s.camera.arrivals[i].survival * next_event.pdf;
-        let density = next_event_density(next_event, p_cam, c);
+        let p_cam = c.cameras as f32 * s.camera.arrivals.get(i).survival * next_event.pdf;
+        let density = next_event_density(&next_event, p_cam, c);
         let light = next_event.light / (density * c.area);
         draws.next_event = Item { light, share: next_event.light_density / density };
     }
-    if !s.camera.arrivals[i].goes_on {
+    if !s.camera.arrivals.get(i).goes_on {
         return draws;
     }
     draws.emitted = Item { light: segment.emitted / c.area, share: emitted_share(s, w, i) };

@@ -46,7 +46,7 @@ impl Segment {
         let cluster = s.clusters.of[i] as usize;
         let c = &s.clusters.clusters[cluster];
         let f = match c.class {
-            SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * s.camera.outgoing[i].pdf,
+            SurfaceClass::Diffuse => s.camera.arrivals.get(i).reflectance * s.camera.outgoing.pdf(i),
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (s.clusters.place[i] - c.first) as usize;
                 w.row(cluster, row)[row]
@@ -70,17 +70,14 @@ pub(super) fn reciprocal(density: f32) -> f32 {
 /// Whether a segment that leaves arrival `i` ends at the next one.
 #[inline]
 pub(super) fn has_end(s: Sampled, i: usize) -> bool {
-    s.camera.outgoing[i].forward > 0.0
+    s.camera.outgoing.has_end(i)
 }
 
 /// Lights that the segment which leaves arrival `i` met, each with one over the density of all techniques, `1 / D_E`.
-fn met<'a>(s: Sampled<'a>, w: &Weights, i: usize) -> impl Iterator<Item = (&'a EmissionHit, f32)> {
-    let hits = &s.camera.hits;
+fn met<'a>(s: Sampled<'a>, w: &Weights, i: usize) -> impl Iterator<Item = (EmissionHit, f32)> + use<'a> {
     let here = s.cluster_of(i);
     let camera = w.densities[s.clusters.place[i] as usize].camera / here.area;
-    let first = hits.partition_point(|h| (h.arrival as usize) < i);
-    let own = hits[first..].iter().take_while(move |h| h.arrival as usize == i);
-    own.map(move |h| {
+    s.camera.hits.of(i).map(move |h| {
         let next_event = h.next_event_pdf * here.cameras as f32 / here.area;
         (h, reciprocal(h.forward * camera + next_event + h.light_density))
     })
@@ -107,7 +104,7 @@ pub(super) fn emitted_share(s: Sampled, w: &Weights, i: usize) -> f32 {
 /// The constants of all camera segments.
 pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
     let one = |i: usize| {
-        let (a, out) = (&s.camera.arrivals[i], &s.camera.outgoing[i]);
+        let (a, out) = (s.camera.arrivals.get(i), s.camera.outgoing.get(i));
         if !a.goes_on {
             return Segment::default();
         }
@@ -129,7 +126,7 @@ pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
         let light = out.reverse * out.squeeze / end.area;
         let (mut bridge, mut chance) = (0.0, 0.0);
         if let Some(bridges) = s.bridges.filter(|_| out.passages == 0) {
-            bridge = Bridges::density(s, a, here, &s.camera.arrivals[i + 1], end);
+            bridge = Bridges::density(s, &a, here, &s.camera.arrivals.get(i + 1), end);
             chance = bridges.chances[s.clusters.of[i + 1] as usize];
         }
         let constants = Segment { camera, light, bridge, ..constants };
@@ -147,7 +144,7 @@ pub(super) fn gather(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec
 
 /// What arrivals reflect of the `values` of the segments that leave their clusters.
 pub(super) fn reflect(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec<Vec3> {
-    let arriving = |i: usize| (values[i] * s.camera.outgoing[i].pdf).as_dvec3();
+    let arriving = |i: usize| (values[i] * s.camera.outgoing.pdf(i)).as_dvec3();
     let shared =
         per_diffuse_cluster(s, cut, |c| s.cameras(c).map(arriving).sum::<DVec3>().as_vec3() / c.area);
     let of_others = |i: usize, c: &Cluster, apart: f32| {
@@ -159,7 +156,7 @@ pub(super) fn reflect(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Ve
         SurfaceClass::Diffuse => {
             let apart = w.densities[s.clusters.place[i] as usize].apart;
             let arriving = if apart == 1.0 { shared[k] } else { of_others(i, c, apart) };
-            s.camera.arrivals[i].reflectance * arriving
+            s.camera.arrivals.get(i).reflectance * arriving
         }
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
             let f = w.row(k, (s.clusters.place[i] - c.first) as usize);

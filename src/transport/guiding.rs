@@ -98,20 +98,21 @@ fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
     let Outcome { sampled: s, weights: w, .. } = o;
     let arrivals = worth_of_arrivals(o, |_| 1.0);
     let shared = per_diffuse_cluster(s, cut, |c| {
-        let reflecting = s.cameras(c).map(|i| (arrivals[i] * s.camera.arrivals[i].reflectance).as_dvec3());
+        let reflecting =
+            s.cameras(c).map(|i| (arrivals[i] * s.camera.arrivals.get(i).reflectance).as_dvec3());
         reflecting.sum::<DVec3>().as_vec3()
     });
     let values = photon_values(s, w);
     let cameras = s.camera.arrivals.len();
     let of_photon = |j: usize| {
-        if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons[j].bounces >= most) {
+        if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons.get(j).bounces >= most) {
             return 0.0;
         }
         let place = s.clusters.place[cameras + j];
         let k = s.clusters.of[cameras + j] as usize;
         let c = &s.clusters.clusters[k];
         let reflected = match c.class {
-            SurfaceClass::Diffuse => shared[k] * s.light.arrivals[j].back_pdf,
+            SurfaceClass::Diffuse => shared[k] * s.light.arrivals.get(j).back_pdf,
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let column = (place - c.first) as usize;
                 s.cameras(c).enumerate().map(|(row, i)| w.row(k, row)[column] * arrivals[i]).sum()
@@ -142,12 +143,12 @@ pub(super) fn worth_of_arrivals(o: Outcome, spread: impl Fn(&Cluster) -> f32 + S
                 if o.max_depth.is_some_and(|most| bounces >= most) {
                     break;
                 }
-                worth[i - first] = along * s.camera.inverse_n2[i];
+                worth[i - first] = along * s.camera.inverse_n2(i);
                 if !has_end(s, i) {
                     break;
                 }
                 along *= constants[i].along_path(s, w, i) * constants[i].carry * spread(s.cluster_of(i));
-                bounces = bounces.saturating_add(1 + s.camera.outgoing[i].passages);
+                bounces = bounces.saturating_add(1 + s.camera.outgoing.get(i).passages);
             }
         }
         worth

@@ -88,7 +88,7 @@ struct LightSegment {
 fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
     let n = s.camera.arrivals.len();
     let one = |j: usize| {
-        let (photon, carry) = (&s.light.photons[j], &s.light.carries[j]);
+        let (photon, carry) = (s.light.photons.get(j), &s.light.carries[j]);
         let Rivals::Later { light_choices, squeeze } = photon.rivals else {
             return LightSegment {
                 emitted: photon_value(s, w, j) * (s.cluster_of(n + j).area * carry.inverse_n2),
@@ -103,7 +103,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
         LightSegment {
             emitted: Vec3::ZERO,
             carry: carry.throughput * reciprocal(light + p_camera / s.cluster_of(n + j).area),
-            passages: photon.bounces - s.light.photons[before].bounces - 1,
+            passages: photon.bounces.saturating_sub(s.light.photons.get(before).bounces + 1),
         }
     };
     (0..s.light.photons.len()).into_par_iter().with_min_len(GRAIN).map(one).collect()
@@ -125,7 +125,7 @@ impl Recursion<'_> {
         let Self { s, w, segments, photons } = self;
         let n = s.camera.arrivals.len();
         let leaving = |i: usize| {
-            let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing[i].passages), Vec3::ZERO));
+            let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing.get(i).passages), Vec3::ZERO));
             segments[i].value(emitted(*s, w, i, most), end)
         };
         let brought = |j: usize| {
@@ -138,12 +138,12 @@ impl Recursion<'_> {
         let numbers = || (0..s.clusters.of.len()).into_par_iter().with_min_len(GRAIN);
         let values: Vec<Vec3> = numbers().map(|i| if i < n { leaving(i) } else { brought(i - n) }).collect();
         let shared = per_diffuse_cluster(*s, cut, |c| {
-            let cameras = s.cameras(c).map(|i| (values[i] * s.camera.outgoing[i].pdf).as_dvec3());
-            let lights = s.lights(c).map(|j| (values[n + j] * s.light.arrivals[j].back_pdf).as_dvec3());
+            let cameras = s.cameras(c).map(|i| (values[i] * s.camera.outgoing.pdf(i)).as_dvec3());
+            let lights = s.lights(c).map(|j| (values[n + j] * s.light.arrivals.get(j).back_pdf).as_dvec3());
             (cameras.sum::<DVec3>() + lights.sum::<DVec3>()).as_vec3() / c.area
         });
         let reflected = |i: usize| {
-            if cut.is_raised() || (i >= n && s.light.photons[i - n].pdf <= 0.0) {
+            if cut.is_raised() || (i >= n && s.light.photons.get(i - n).pdf <= 0.0) {
                 return Vec3::ZERO;
             }
             let (k, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
@@ -168,17 +168,22 @@ impl Recursion<'_> {
 
     fn reflectance(&self, i: usize) -> Vec3 {
         let n = self.s.camera.arrivals.len();
-        if i < n { self.s.camera.arrivals[i].reflectance } else { self.s.light.arrivals[i - n].reflectance }
+        if i < n {
+            self.s.camera.arrivals.get(i).reflectance
+        } else {
+            self.s.light.arrivals.get(i - n).reflectance
+        }
     }
 
     /// `1 / n^2` on the side to which arrival `i` reflects.
     fn inverse_n2(&self, i: usize) -> f32 {
         let n = self.s.camera.arrivals.len();
         if i < n {
-            return self.s.camera.inverse_n2[i];
+            return self.s.camera.inverse_n2(i);
         }
         // where the path goes on, seen from its next arrival
-        match self.s.light.photons.get(i - n + 1).map(|next| &next.rivals) {
+        let next = (i - n + 1 < self.s.light.photons.len()).then(|| self.s.light.photons.get(i - n + 1));
+        match next.map(|next| next.rivals) {
             Some(Rivals::Later { squeeze, .. }) => self.s.light.carries[i - n + 1].inverse_n2 * squeeze,
             _ => self.s.light.carries[i - n].inverse_n2,
         }

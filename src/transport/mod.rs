@@ -22,6 +22,7 @@ pub mod propagate;
 pub mod report;
 mod returns;
 pub mod sizes;
+pub mod sparse;
 pub mod store;
 #[cfg(test)]
 pub(crate) mod testing;

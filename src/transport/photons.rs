@@ -28,7 +28,7 @@ pub struct FromPhotons {
 pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
     let i = s.camera.arrivals.len() + j;
     let c = s.cluster_of(i);
-    let photon = &s.light.photons[j];
+    let photon = s.light.photons.get(j);
     let camera = photon.camera_choices * w.densities[s.clusters.place[i] as usize].camera / c.area;
     let (own, others) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
@@ -40,10 +40,10 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
         Rivals::Later { light_choices, squeeze } => {
             let before = s.cluster_of(i - 1);
             let p_light = w.densities[s.clusters.place[i - 1] as usize].light;
-            let straight = photon.bounces == s.light.photons[j - 1].bounces + 1;
+            let straight = photon.bounces == s.light.photons.get(j - 1).bounces + 1;
             let bridged = s.bridges.filter(|_| straight).map_or(0.0, |b| {
-                let [x, y] = [j, j - 1].map(|j| &s.light.arrivals[j]);
-                b.others[j - 1].chance * Bridges::density(s, x, c, y, before)
+                let [x, y] = [j, j - 1].map(|j| s.light.arrivals.get(j));
+                b.others[j - 1].chance * Bridges::density(s, &x, c, &y, before)
             });
             (light_choices * squeeze * p_light / before.area, camera + bridged)
         }
@@ -55,7 +55,7 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
 /// Flux over area of a photon, times its weight.
 pub(super) fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
     let c = s.cluster_of(s.camera.arrivals.len() + j);
-    s.light.photons[j].flux * (photon_weight(s, w, j) * c.inverse_area)
+    s.light.photons.get(j).flux * (photon_weight(s, w, j) * c.inverse_area)
 }
 
 /// What every photon brings to its cluster; nothing where no camera path arrives.
@@ -90,7 +90,7 @@ struct Approach {
 impl Approach {
     fn new(s: Sampled, segments: &[Segment], i: usize, c: &Cluster) -> Option<Self> {
         if let Some(b) = i.checked_sub(1).filter(|&b| has_end(s, b)) {
-            let throughput = s.camera.outgoing[b].throughput;
+            let throughput = s.camera.outgoing.throughput(b);
             return Some(Self { segment: segments[b], throughput, is_primary: false });
         }
         let seen = s.bridges?.seen[i];
@@ -115,7 +115,7 @@ pub(super) fn gather_photons(
     cut: &Cut,
     wanted: impl Fn(u32) -> bool + Sync,
 ) -> Vec<FromPhotons> {
-    let light = |j: usize| if wanted(s.light.photons[j].bounces) { values[j] } else { Vec3::ZERO };
+    let light = |j: usize| if wanted(s.light.photons.get(j).bounces) { values[j] } else { Vec3::ZERO };
     let others = |j: usize| s.bridges.map_or_else(Others::default, |b| b.others[j]);
     let bridged = |i: usize| match s.bridges {
         Some(b) if wanted(b.segments[i].bounces) => w.bridged[s.clusters.place[i] as usize],
@@ -127,7 +127,7 @@ pub(super) fn gather_photons(
         }
         let (mut arriving, mut left_out) = (DVec3::ZERO, DVec3::ZERO);
         for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
-            let value = (light(j) * s.light.arrivals[j].back_pdf).as_dvec3();
+            let value = (light(j) * s.light.arrivals.get(j).back_pdf).as_dvec3();
             let Others { chance, number } = others(j);
             arriving += value;
             left_out += value.element_sum() * Vec3::new(own, chance, number).as_dvec3();
@@ -159,7 +159,7 @@ pub(super) fn gather_photons(
         let mut over_bridges = Vec3::ZERO;
         match c.class {
             SurfaceClass::Diffuse => {
-                let (a, Shared { arriving, own, others }) = (&s.camera.arrivals[i], shared[k]);
+                let (a, Shared { arriving, own, others }) = (s.camera.arrivals.get(i), shared[k]);
                 sum.reflected = a.reflectance * arriving;
                 sum.brought = carry(own * a.back_pdf, others) * sum.reflected;
                 if let Some(light) = &bridged_light {
@@ -185,7 +185,7 @@ pub(super) fn gather_photons(
             sum.reflected += over_bridges;
             sum.brought += carry(0.0, all) * over_bridges;
         }
-        let inverse_n2 = s.camera.inverse_n2[i];
+        let inverse_n2 = s.camera.inverse_n2(i);
         FromPhotons { reflected: sum.reflected * inverse_n2, brought: sum.brought * inverse_n2 }
     })
 }

@@ -109,7 +109,7 @@ impl Reflected {
                 }
                 let place = s.clusters.place[i] as usize;
                 let mut light = w.direct[place];
-                if s.camera.arrivals[i].goes_on {
+                if s.camera.arrivals.get(i).goes_on {
                     let segment = &self.segments[i];
                     let end = has_end(s, i).then(|| (tails[i + 1 - first], self.photons[i + 1].brought));
                     let brought = segment.value(segment.emitted, end);

@@ -17,7 +17,7 @@ const MOST: u32 = 64;
 impl CameraStore {
     /// Whether two arrivals, the earlier one first, are of the same path.
     fn are_one_path(&self, earlier: u32, later: u32) -> bool {
-        (earlier..later).all(|i| self.outgoing[i as usize].forward > 0.0)
+        (earlier..later).all(|i| self.outgoing.has_end(i as usize))
     }
 }
 

@@ -8,7 +8,7 @@
 use super::bridge::Bridges;
 use super::cluster::{Cluster, Clusters};
 use super::returns::{Gathered, leave_out, ratio};
-use super::store::{CameraStore, LightStore, NextEvent};
+use super::store::{Arrival, CameraStore, LightStore, NextEvent};
 use super::{Cut, Estimator};
 use crate::math::density::ProjectedPdf;
 use crate::shading::bsdf::{Among, Bsdf};
@@ -109,12 +109,12 @@ impl<'a> Sampled<'a> {
     /// Path of light arrival `j`.
     #[inline]
     fn path(&self, j: usize) -> u32 {
-        self.light.photons[j].path
+        self.light.photons.get(j).path
     }
 
     /// For every light arrival of the cluster, in their order: the sum of `q` over those of its path there.
     pub fn path_survivals(&self, c: &Cluster) -> Vec<f32> {
-        let mut q: Vec<f32> = self.lights(c).map(|j| self.light.arrivals[j].survival).collect();
+        let mut q: Vec<f32> = self.lights(c).map(|j| self.light.arrivals.get(j).survival).collect();
         self.sum_over_paths(c, &mut q);
         q
     }
@@ -252,27 +252,26 @@ fn columns(s: Sampled, c: &Cluster) -> usize {
 
 fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     let sum = |q: &mut dyn Iterator<Item = f32>| q.map(f64::from).sum::<f64>();
-    let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals[i].survival)) as f32;
-    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals[j].survival)) as f32;
+    let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals.get(i).survival)) as f32;
+    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals.get(j).survival)) as f32;
     let mut arriving = DVec3::ZERO;
     for i in s.cameras(c) {
-        let n = &s.camera.next_events[i];
-        if n.next_event_pdf > 0.0 {
-            arriving += (next_event_value(n, q_camera * n.pdf, c) * n.pdf).as_dvec3();
+        if let Some(n) = s.camera.next_events.get(i) {
+            arriving += (next_event_value(&n, q_camera * n.pdf, c) * n.pdf).as_dvec3();
         }
     }
     let arriving = arriving.as_vec3() / c.area;
     for (row, i) in s.cameras(c).enumerate() {
-        let a = &s.camera.arrivals[i];
+        let a = s.camera.arrivals.get(i);
         let gathered = Gathered::new(s, c, row);
         let apart = match estimator == Estimator::LeaveOneOut && !gathered.is_all() {
             true => {
-                let q = gathered.arrivals(s, c).map(|i| s.camera.arrivals[i].survival);
+                let q = gathered.arrivals(s, c).map(|i| s.camera.arrivals.get(i).survival);
                 ratio(q_camera, q.sum())
             }
             false => 1.0,
         };
-        let camera = q_camera * s.camera.outgoing[i].pdf;
+        let camera = q_camera * s.camera.outgoing.pdf(i);
         batch.densities.push(Density { camera, light: q_light * a.back_pdf, apart });
         batch.direct.push(a.reflectance * arriving);
         if let Some(bridges) = s.bridges {
@@ -281,14 +280,14 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
         }
     }
     for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
-        let a = &s.light.arrivals[j];
+        let a = s.light.arrivals.get(j);
         let q = match estimator {
             Estimator::LeaveOneOut => (q_light - own).max(0.0),
             Estimator::Literal | Estimator::WholePath => q_light,
         };
         batch.densities.push(Density {
             camera: q_camera * a.back_pdf,
-            light: q * s.light.photons[j].pdf,
+            light: q * s.light.photons.get(j).pdf,
             apart: 1.0,
         });
         batch.direct.push(a.reflectance * arriving);
@@ -296,16 +295,39 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     }
     if estimator == Estimator::WholePath {
         batch.towards_lights.extend(s.cameras(c).map(|i| {
-            let pdf = s.camera.next_events[i].pdf;
-            TowardsLight { value: s.camera.arrivals[i].reflectance * pdf, camera: q_camera * pdf }
+            let pdf = s.camera.next_events.get(i).map_or(0.0, |n| n.pdf);
+            TowardsLight { value: s.camera.arrivals.get(i).reflectance * pdf, camera: q_camera * pdf }
         }));
         batch.towards_lights.resize(batch.densities.len(), TowardsLight::default());
     }
 }
 
+/// An arrival of a cluster whose lobes are evaluated pair by pair.
+struct Member {
+    number: usize,
+    arrival: Arrival,
+    bsdf: Bsdf,
+    /// Direction of the segment that leaves it, if there is one.
+    leaves: Option<Vec3>,
+}
+
+impl Member {
+    fn of_camera(s: Sampled, i: usize) -> Self {
+        let arrival = s.camera.arrivals.get(i);
+        let leaves = arrival.goes_on.then(|| s.camera.outgoing.get(i).direction);
+        Self { number: i, arrival, bsdf: arrival.bsdf(s.world), leaves }
+    }
+
+    fn of_light(s: Sampled, j: usize) -> Self {
+        let arrival = s.light.arrivals.get(j);
+        let leaves = arrival.goes_on.then(|| s.light.photons.get(j).direction);
+        Self { number: j, arrival, bsdf: arrival.bsdf(s.world), leaves }
+    }
+}
+
 fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
-    let cameras: Vec<(usize, Bsdf)> = s.cameras(c).map(|i| (i, s.camera.arrivals[i].bsdf(s.world))).collect();
-    let lights: Vec<(usize, Bsdf)> = s.lights(c).map(|j| (j, s.light.arrivals[j].bsdf(s.world))).collect();
+    let cameras: Vec<Member> = s.cameras(c).map(|i| Member::of_camera(s, i)).collect();
+    let lights: Vec<Member> = s.lights(c).map(|j| Member::of_light(s, j)).collect();
     let (n, m) = (cameras.len(), lights.len());
     let width = columns(s, c);
     let first = batch.densities.len();
@@ -313,16 +335,13 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     batch.direct.resize(first + n + m, Vec3::ZERO);
     let matrix = batch.values.len();
     // who gathers, as seen from where, and with which `q`: a light arrival's path is no technique of the camera
-    let mut gatherers: Vec<(Cow<Bsdf>, Vec3, f32)> = cameras
-        .iter()
-        .map(|(i, bsdf)| (Cow::Borrowed(bsdf), s.camera.arrivals[*i].wo, s.camera.arrivals[*i].survival))
-        .collect();
+    let mut gatherers: Vec<(Cow<Bsdf>, Vec3, f32)> =
+        cameras.iter().map(|m| (Cow::Borrowed(&m.bsdf), m.arrival.wo, m.arrival.survival)).collect();
     if estimator == Estimator::Literal {
-        gatherers.extend(s.lights(c).map(|j| {
-            let a = &s.light.arrivals[j];
+        gatherers.extend(lights.iter().map(|m| {
             // nobody reads what one gathers whose path ends
-            let wo = if a.goes_on { s.light.photons[j].direction } else { a.wo };
-            (Cow::Owned(a.bsdf_from(s.world, wo)), wo, 0.0)
+            let wo = m.leaves.unwrap_or(m.arrival.wo);
+            (Cow::Owned(m.arrival.bsdf_from(s.world, wo)), wo, 0.0)
         }));
     }
     let rows = gatherers.len();
@@ -330,7 +349,8 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
     batch.owns.resize(owns + n * m, 0.0);
     batch.values.resize(matrix + rows * width, Vec3::ZERO);
     let densities = &mut batch.densities[first..];
-    let bridges = cameras.iter().filter_map(|(i, _)| Some(&s.bridges?.segments[*i]));
+    let bridges = cameras.iter().filter_map(|m| Some(&s.bridges?.segments[m.number]));
+    let next_events: Vec<_> = cameras.iter().map(|m| s.camera.next_events.get(m.number)).collect();
     let mut bridge_pdfs = vec![0.0; n];
     let mut next_event_pdfs = vec![0.0; n];
     let mut next_event_values = vec![Vec3::ZERO; rows * n];
@@ -342,22 +362,21 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
                 sight.as_ref().map_or((Vec3::ZERO, ProjectedPdf(0.0)), |s| s.look(w));
             (q * pdf, value)
         };
-        for (column, (i, _)) in cameras.iter().enumerate() {
-            if s.camera.arrivals[*i].goes_on {
-                let (pdf, value) = look(s.camera.outgoing[*i].direction);
+        for (column, (member, next_event)) in cameras.iter().zip(&next_events).enumerate() {
+            if let Some(direction) = member.leaves {
+                let (pdf, value) = look(direction);
                 densities[column].camera += pdf;
                 leaving_pdfs[row * n + column] = pdf;
                 batch.values[matrix + row * width + column] = value;
             }
-            let next_event = &s.camera.next_events[*i];
-            if next_event.next_event_pdf > 0.0 {
+            if let Some(next_event) = next_event {
                 let (pdf, value) = look(next_event.direction);
                 next_event_pdfs[column] += pdf;
                 next_event_values[row * n + column] = value;
             }
         }
-        for (column, (j, _)) in lights.iter().enumerate() {
-            let w = s.light.arrivals[*j].wo;
+        for (column, member) in lights.iter().enumerate() {
+            let w = member.arrival.wo;
             let (pdf, value) = look(w);
             densities[n + column].camera += pdf;
             batch.values[matrix + row * width + n + column] = value / bsdf.relative_index(*wo, w).powi(2);
@@ -376,28 +395,27 @@ fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
         batch.bridged.extend(bridges.zip(&bridge_pdfs).map(|(b, &p_cam)| b.value(p_cam, c)));
         batch.bridged.resize(first + n + m, Vec3::ZERO);
     }
-    for (t, (own, bsdf)) in lights.iter().enumerate() {
-        let a = &s.light.arrivals[*own];
-        let sight = bsdf.sight(a.wo, Among::Continuous);
+    for (t, own) in lights.iter().enumerate() {
+        let a = &own.arrival;
+        let sight = own.bsdf.sight(a.wo, Among::Continuous);
         let pdf = |w: Vec3| sight.as_ref().map_or(0.0, |s| a.survival * s.pdf(w).0);
-        for (row, (i, _)) in cameras.iter().enumerate() {
-            let part = pdf(s.camera.arrivals[*i].wo);
+        for (row, member) in cameras.iter().enumerate() {
+            let part = pdf(member.arrival.wo);
             densities[row].light += part;
             batch.owns[owns + row * m + t] = part;
         }
-        for (other, (j, _)) in lights.iter().enumerate() {
-            let is_rival = estimator != Estimator::LeaveOneOut || s.path(*j) != s.path(*own);
-            if is_rival && s.light.arrivals[*j].goes_on {
-                densities[n + other].light += pdf(s.light.photons[*j].direction);
+        for (other, member) in lights.iter().enumerate() {
+            let is_rival = estimator != Estimator::LeaveOneOut || s.path(member.number) != s.path(own.number);
+            if let Some(direction) = member.leaves.filter(|_| is_rival) {
+                densities[n + other].light += pdf(direction);
             }
         }
     }
     for row in 0..n {
         s.sum_over_paths(c, &mut batch.owns[owns + row * m..][..m]);
     }
-    for (column, (i, _)) in cameras.iter().enumerate() {
-        let next_event = &s.camera.next_events[*i];
-        if next_event.next_event_pdf > 0.0 {
+    for (column, next_event) in next_events.iter().enumerate() {
+        if let Some(next_event) = next_event {
             let value = next_event_value(next_event, next_event_pdfs[column], c) / c.area;
             for row in 0..rows {
                 batch.direct[first + row] += next_event_values[row * n + column] * value;
