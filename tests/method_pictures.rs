@@ -98,7 +98,7 @@ fn seen(world: &World, sensor: &Sensor) -> (CameraStore, Vec<Primary>) {
     let sampler = CameraSampler { goes_on: false, ..sampler(world, sensor) };
     let pixels = (0..SIDE * SIDE).map(|k| Vec2::new((k % SIDE) as f32 + 0.5, (k / SIDE) as f32 + 0.5));
     let primaries = pixels
-        .map(|p| sampler.path(&sensor.ray(p, Vec2::ZERO), &mut Sampler::new(0, 0, 0), &mut store, &mut 0))
+        .map(|p| sampler.path(&sensor.ray(p, Vec2::ZERO), &mut Sampler::new(0, 0, 0), &mut store, &mut 0).0)
         .collect();
     (store, primaries)
 }

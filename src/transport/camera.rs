@@ -38,8 +38,6 @@ pub struct Primary {
     pub mirrored: Vec3,
     /// Coverage.
     pub alpha: f32,
-    /// The first surface on it.
-    pub first_hit: Option<FirstHit>,
 }
 
 impl Primary {
@@ -54,7 +52,6 @@ impl Primary {
         emission: Vec3::ZERO,
         mirrored: Vec3::ZERO,
         alpha: 1.0,
-        first_hit: None,
     };
 }
 
@@ -82,6 +79,7 @@ pub struct CameraSampler<'a> {
 struct Seeing<'a> {
     sampler: &'a CameraSampler<'a>,
     primary: &'a mut Primary,
+    first_hit: Option<FirstHit>,
 }
 
 impl Seeing<'_> {
@@ -117,7 +115,7 @@ impl Witness for Seeing<'_> {
 
     fn surface(&mut self, hit: &SurfacePoint, vertex: &Vertex, wo: Vec3) {
         let CameraSampler { world, sensor, .. } = self.sampler;
-        self.primary.first_hit.get_or_insert_with(|| world.first_hit(sensor, hit, vertex, wo));
+        self.first_hit.get_or_insert_with(|| world.first_hit(sensor, hit, vertex, wo));
     }
 
     fn escaped(&mut self, chain: &Chain) {
@@ -182,19 +180,21 @@ impl Witness for Meeting<'_> {
 }
 
 impl CameraSampler<'_> {
-    /// Samples the path of one camera ray into the store. Adds the rays it takes to `rays`.
+    /// Samples the path of one camera ray into the store. Adds the rays it takes to `rays`. Returns what the pixel sees, and
+    /// the first surface on the way.
     pub fn path(
         &self,
         ray: &CameraRay,
         sampler: &mut Sampler,
         store: &mut CameraStore,
         rays: &mut u64,
-    ) -> Primary {
+    ) -> (Primary, Option<FirstHit>) {
         let mut primary = Primary::NOTHING;
         let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: true };
-        let mut seeing = Seeing { sampler: self, primary: &mut primary };
+        let mut seeing = Seeing { sampler: self, primary: &mut primary, first_hit: None };
         let (chain, end) = follow.segment(Piece::from_camera(ray), sampler, &mut seeing, rays);
-        let Some(mut end) = end else { return primary };
+        let first_hit = seeing.first_hit;
+        let Some(mut end) = end else { return (primary, first_hit) };
         let first = store.arrivals.len();
         primary.arrival = Some(first as u32);
         primary.weight = chain.throughput / chain.forward;
@@ -279,7 +279,7 @@ impl CameraSampler<'_> {
             inverse_n2 = start_n2 * squeeze;
         }
         primary.unfiltered = own.light;
-        primary
+        (primary, first_hit)
     }
 
     /// A next-event segment along which light arrives, and the value of the lobes.

@@ -7,12 +7,12 @@
 
 use super::Cut;
 use super::depth::{Levels, longest_chain};
-use super::exchange::{GRAIN, Segment, emitted, has_end, per_diffuse_cluster, reciprocal, segments};
-use super::photons::{FromPhotons, photon_value};
+use super::exchange::{GRAIN, Segments, emitted, has_end, per_diffuse_cluster, reciprocal};
+use super::photons::photon_value;
 use super::propagate::Reflected;
 use super::store::Rivals;
 use super::weigh::{Sampled, Weights};
-use crate::math::luminance;
+use crate::math::{SharedExponent, luminance};
 use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ impl Reflected {
         bounces: Option<u32>,
         cut: &Cut,
     ) -> bool {
-        self.segments = segments(s, w);
+        self.segments = Segments::new(s, w);
         let recursion = Recursion { s, w, segments: &self.segments, photons: photon_segments(s, w) };
         // without a limit a chain counts no more than a straight segment
         let sweeps_of = |passages: u32| if bounces.is_some() { passages } else { 0 };
@@ -42,7 +42,8 @@ impl Reflected {
         let start = vec![Vec3::ZERO; s.clusters.of.len()];
         let mut levels = Levels::new(start, sweeps_of(chains.max(longest_chain(s, first))));
         let n = s.camera.arrivals.len();
-        self.direct = vec![Vec3::ZERO; n];
+        let nothing = || vec![SharedExponent::default(); n];
+        self.direct = nothing();
         let mut before = 0.0;
         for k in 1..=bounces.unwrap_or(SWEEPS[1]) {
             if cut.is_raised() {
@@ -53,7 +54,7 @@ impl Reflected {
                 |i: usize, passages: u32| levels.back(sweeps_of(passages)).map_or(Vec3::ZERO, |l| l[i]);
             let next = recursion.sweep(read, most, cut);
             if k == 1 {
-                self.direct.copy_from_slice(&next[..n]);
+                self.direct = next[..n].iter().map(|l| SharedExponent::encode(*l)).collect();
             }
             let now = first.iter().map(|&(i, _)| f64::from(luminance(next[i as usize]))).sum::<f64>();
             levels.push(next);
@@ -63,10 +64,10 @@ impl Reflected {
                 break;
             }
         }
-        (self.carried, self.photons) = (vec![Vec3::ZERO; n], vec![FromPhotons::default(); n]);
+        (self.carried, self.photons) = (nothing(), nothing());
         for &(arrival, passages) in first {
             if let Some(level) = levels.back(sweeps_of(passages)) {
-                self.carried[arrival as usize] = level[arrival as usize];
+                self.carried[arrival as usize] = SharedExponent::encode(level[arrival as usize]);
             }
         }
         true
@@ -113,7 +114,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
 struct Recursion<'a> {
     s: Sampled<'a>,
     w: &'a Weights,
-    segments: &'a [Segment],
+    segments: &'a Segments,
     photons: Vec<LightSegment>,
 }
 
@@ -126,7 +127,7 @@ impl Recursion<'_> {
         let n = s.camera.arrivals.len();
         let leaving = |i: usize| {
             let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing.get(i).passages), Vec3::ZERO));
-            segments[i].value(emitted(*s, w, i, most), end)
+            segments.value(*s, i, emitted(*s, w, i, most), end)
         };
         let brought = |j: usize| {
             let p = &photons[j];
@@ -153,15 +154,16 @@ impl Recursion<'_> {
                 SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                     let (to_camera, to_light) =
                         w.row(k, (place - c.first) as usize).split_at(c.cameras as usize);
-                    let cameras: Vec3 = to_camera.iter().zip(s.cameras(c)).map(|(f, i)| *f * values[i]).sum();
+                    let cameras: Vec3 =
+                        to_camera.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * values[i]).sum();
                     // the row holds f (n_o / n_i)^2, and radiance is basic
                     let lights = to_light.iter().zip(s.lights(c)).map(|(f, j)| {
-                        *f * values[n + j] * (self.inverse_n2(i) / s.light.carries[j].inverse_n2)
+                        f.decode() * values[n + j] * (self.inverse_n2(i) / s.light.carries[j].inverse_n2)
                     });
                     (cameras + lights.sum::<Vec3>()) / c.area
                 }
             };
-            w.direct[place as usize] + gathered
+            w.direct(place) + gathered
         };
         numbers().map(reflected).collect()
     }

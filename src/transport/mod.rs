@@ -17,6 +17,7 @@ pub mod light;
 mod literal;
 pub mod operator;
 mod own_path;
+mod paired;
 mod photons;
 pub mod propagate;
 pub mod report;

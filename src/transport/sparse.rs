@@ -48,7 +48,6 @@ impl Bits {
 
     /// Appends the places of another.
     pub fn append(&mut self, other: &Self) {
-        self.words.reserve(other.words.len());
         (0..other.len).for_each(|i| self.push(other.get(i)));
     }
 
@@ -58,9 +57,9 @@ impl Bits {
         self.words.clear();
     }
 
-    /// Makes room for so many places in all, and no more.
+    /// Makes room for so many more places, and no more.
     pub fn reserve(&mut self, places: usize) {
-        let words = places.div_ceil(WORD);
+        let words = (self.len + places).div_ceil(WORD);
         self.words.reserve_exact(words.saturating_sub(self.words.len()));
     }
 
@@ -135,10 +134,10 @@ impl<T> Sparse<T> {
         self.items.clear();
     }
 
-    /// Makes room for so many places and elements in all, and no more.
+    /// Makes room for so many more places and elements, and no more.
     pub fn reserve(&mut self, places: usize, items: usize) {
         self.places.reserve(places);
-        self.items.reserve_exact(items.saturating_sub(self.items.len()));
+        self.items.reserve_exact(items);
     }
 
     /// Memory, bytes.
@@ -164,7 +163,7 @@ mod tests {
             s.iter().for_each(|item| sparse.push(*item));
             sparse
         });
-        first.reserve(1333, first.count() + second.count());
+        first.reserve(333, second.count());
         first.append(&mut second);
         assert!(second.is_empty() && second.count() == 0);
         let all = [a, b].concat();

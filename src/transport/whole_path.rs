@@ -40,11 +40,11 @@
 use super::Cut;
 use super::arrival::{early_survival, reversed};
 use super::camera::EARLY;
-use super::exchange::{Segment, has_end, reciprocal, segments};
-use super::photons::FromPhotons;
+use super::exchange::{Densities, Segments, has_end, reciprocal};
 use super::propagate::Reflected;
 use super::store::{EmissionHit, NextEvent, Rivals};
 use super::weigh::{Sampled, Weights};
+use crate::math::SharedExponent;
 use crate::shading::SurfaceClass;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -86,7 +86,6 @@ struct Step {
 struct WholePaths<'a> {
     s: Sampled<'a>,
     w: &'a Weights,
-    segments: &'a [Segment],
     rests: Vec<Rest>,
 }
 
@@ -101,8 +100,8 @@ impl Reflected {
         bounces: Option<u32>,
         cut: &Cut,
     ) -> bool {
-        self.segments = segments(s, w);
-        let paths = WholePaths { s, w, segments: &self.segments, rests: rests(s, w) };
+        self.segments = Segments::new(s, w);
+        let paths = WholePaths { s, w, rests: rests(s, w) };
         let most = bounces.unwrap_or(u32::MAX);
         let one = |&(start, passages): &(u32, u32)| match cut.is_raised() {
             true => (Vec3::ZERO, Vec3::ZERO),
@@ -110,10 +109,11 @@ impl Reflected {
         };
         let light: Vec<(Vec3, Vec3)> = first.par_iter().map(one).collect();
         let n = s.camera.arrivals.len();
-        (self.carried, self.photons) = (vec![Vec3::ZERO; n], vec![FromPhotons::default(); n]);
-        self.direct = vec![Vec3::ZERO; n];
+        let nothing = || vec![SharedExponent::default(); n];
+        (self.carried, self.photons, self.direct) = (nothing(), nothing(), nothing());
         for (&(arrival, _), (all, direct)) in first.iter().zip(light) {
-            (self.carried[arrival as usize], self.direct[arrival as usize]) = (all, direct);
+            self.carried[arrival as usize] = SharedExponent::encode(all);
+            self.direct[arrival as usize] = SharedExponent::encode(direct);
         }
         !cut.is_raised()
     }
@@ -278,7 +278,7 @@ impl WholePaths<'_> {
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (s.clusters.place[i] - c.first) as usize;
                 let values = &w.row(s.clusters.of[i] as usize, row)[c.cameras as usize..];
-                s.lights(c).zip(values).for_each(|(j, value)| photon(j, *value));
+                s.lights(c).zip(values).for_each(|(j, value)| photon(j, value.decode()));
             }
         }
     }
@@ -297,14 +297,14 @@ impl WholePaths<'_> {
     /// The sub-path up to the arrival after `i`.
     fn beyond(&self, i: usize, at: &Prefix, near: f32) -> Prefix {
         let (a, out) = (self.s.camera.arrivals.get(i), self.s.camera.outgoing.get(i));
-        let segment = &self.segments[i];
-        let a_next = segment.camera / self.s.cluster_of(i).cameras as f32;
+        let densities = Densities::of(self.s, self.w, i);
+        let a_next = densities.camera / self.s.cluster_of(i).cameras as f32;
         let density = a.survival * out.pdf * out.forward;
         Prefix {
             throughput: at.throughput * self.value_leaving(i) * out.throughput * reciprocal(density),
             bounces: at.bounces + 1 + out.passages,
             is_first: false,
-            back: segment.light * reciprocal(a_next) * near,
+            back: densities.light * reciprocal(a_next) * near,
         }
     }
 
@@ -316,7 +316,7 @@ impl WholePaths<'_> {
             SurfaceClass::Diffuse => s.camera.arrivals.get(i).reflectance * s.camera.outgoing.get(i).pdf,
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (s.clusters.place[i] - c.first) as usize;
-                self.w.row(cluster, row)[row]
+                self.w.row(cluster, row)[row].decode()
             }
         }
     }

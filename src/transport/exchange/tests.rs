@@ -81,7 +81,7 @@ fn the_weights_of_all_techniques_sum_to_one() {
             (clustered(&world, &camera, &light, Areas::OfPhotons), Weights::default());
         let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
         assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
-        let constants = segments(s, &weights);
+        let constants = Segments::new(s, &weights);
         let (mut checked, mut through_glass, mut shared) = (0, 0, 0);
         for i in (0..camera.arrivals.len()).step_by(2) {
             let n = camera.arrivals.len();
@@ -96,7 +96,7 @@ fn the_weights_of_all_techniques_sum_to_one() {
             }
             let twin = if returns { light.arrivals.get(i + 1).survival } else { 0.0 };
             let own = (light.arrivals.get(i).survival + twin) * light.photons.get(i).pdf;
-            let segment = &constants[i];
+            let segment = Densities::of(s, &weights, i);
             let p_light = weights.densities[clusters.place[i + 1] as usize].light;
             // the light path itself is left out both ways, all of it
             let camera_weight = segment.camera / (segment.camera + segment.light * (p_light - own).max(0.0));
@@ -105,7 +105,7 @@ fn the_weights_of_all_techniques_sum_to_one() {
             assert!((sum - 1.0).abs() < 2e-4, "{wall}, {i}: {camera_weight} + {light_weight}");
             // and with the light path itself among the techniques
             let all = segment.camera + segment.light * p_light;
-            let carried = segment.carry / camera.outgoing.get(i).throughput * all;
+            let carried = constants.carry(s, i) / camera.outgoing.throughput(i) * all;
             assert!((carried - Vec3::ONE).abs().max_element() < 1e-4, "{carried}");
             checked += 1;
             through_glass += u32::from(camera.outgoing.get(i).passages > 0);
@@ -138,7 +138,7 @@ fn sums_over_ten_million_segments_are_as_good_as_in_double_precision() {
     let arriving = |(i, v): (usize, &Vec3)| v.as_dvec3() * f64::from(camera.outgoing.pdf(i));
     let exact: DVec3 = values.iter().enumerate().map(arriving).sum();
     let expected = camera.arrivals.get(0).reflectance.as_dvec3() * exact / f64::from(cluster.area);
-    let got = gather(s, &weights, &values, &ON)[0].as_dvec3();
+    let got = reflect(s, &weights, |i| values[i], |_, light| light, &ON)[0].as_dvec3();
     assert!((got / expected - 1.0).abs().max_element() < 1e-5, "{got}, not {expected}");
 
     let choices: f64 = camera.arrivals.iter().map(|a| f64::from(a.survival)).sum();

@@ -38,7 +38,7 @@ fn an_arrival_gathers_from_its_own_segment_and_from_other_paths() {
             false => Vec3::ZERO,
         };
         let values: Vec<Vec3> = (0..path.len()).map(value).collect();
-        let got = reflect(s, &weights, &values, &ON);
+        let got = reflect(s, &weights, |i| values[i], |_, light| light, &ON);
         // value and `q p` of an arrival's lobes
         let look = |i: usize, w: Vec3| {
             let a = camera.arrivals.get(i);

@@ -161,9 +161,9 @@ impl Arrivals {
         self.0.clear();
     }
 
-    /// Makes room for so many in all, and no more.
+    /// Makes room for so many more, and no more.
     pub fn reserve(&mut self, count: usize) {
-        self.0.reserve_exact(count.saturating_sub(self.0.len()));
+        self.0.reserve_exact(count);
     }
 
     /// Memory, bytes.

@@ -65,11 +65,16 @@ impl Hits {
         });
     }
 
+    /// Whether the segment that left arrival `i` met some.
+    #[inline]
+    pub fn has(&self, i: usize) -> bool {
+        i < self.places.len() && self.places.get(i)
+    }
+
     /// Those of the segment that left arrival `i`.
     pub fn of(&self, i: usize) -> impl Iterator<Item = EmissionHit> {
-        let has_some = i < self.places.len() && self.places.get(i);
         let first =
-            if has_some { self.hits.partition_point(|h| (h.arrival as usize) < i) } else { self.len() };
+            if self.has(i) { self.hits.partition_point(|h| (h.arrival as usize) < i) } else { self.len() };
         self.hits[first..].iter().take_while(move |h| h.arrival as usize == i).map(Packed::hit)
     }
 
@@ -90,10 +95,10 @@ impl Hits {
         self.places.clear();
     }
 
-    /// Makes room for so many, of so many arrivals in all, and no more.
+    /// Makes room for so many more, of so many arrivals, and no more.
     pub fn reserve(&mut self, arrivals: usize, hits: usize) {
         self.places.reserve(arrivals);
-        self.hits.reserve_exact(hits.saturating_sub(self.hits.len()));
+        self.hits.reserve_exact(hits);
     }
 
     /// Memory, bytes.

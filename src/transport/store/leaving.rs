@@ -129,7 +129,7 @@ impl Outgoings {
         self.ends.clear();
     }
 
-    /// Makes room for all of these, and no more.
+    /// Makes room for all of these, too, and no more.
     pub fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
         let places = parts.clone().map(Self::len).sum();
         self.segments.reserve(places, parts.clone().map(|o| o.segments.count()).sum());
@@ -209,7 +209,7 @@ impl NextEvents {
         self.0.clear();
     }
 
-    /// Makes room for all of these, and no more.
+    /// Makes room for all of these, too, and no more.
     pub fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
         self.0.reserve(parts.clone().map(Self::len).sum(), parts.map(Self::count).sum());
     }

@@ -254,7 +254,7 @@ impl CameraStore {
             + self.hits.bytes()
     }
 
-    /// Makes room for the paths of all these stores, and no more.
+    /// Makes room for the paths of all these stores, too, and no more.
     pub fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
         let arrivals = parts.clone().map(|p| p.arrivals.len()).sum();
         self.arrivals.reserve(arrivals);
@@ -293,15 +293,13 @@ impl LightStore {
         self.arrivals.bytes() + self.photons.bytes() + bytes(&self.starts) + bytes(&self.carries)
     }
 
-    /// Makes room for the paths of all these stores, and no more.
+    /// Makes room for the paths of all these stores, too, and no more.
     pub fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
         let arrivals = parts.clone().map(|p| p.arrivals.len()).sum();
         self.arrivals.reserve(arrivals);
         self.photons.reserve(arrivals);
-        let missing = |wanted: usize, len: usize| wanted.saturating_sub(len);
-        let starts = parts.clone().map(|p| p.starts.len()).sum();
-        self.starts.reserve_exact(missing(starts, self.starts.len()));
-        self.carries.reserve_exact(missing(parts.map(|p| p.carries.len()).sum(), self.carries.len()));
+        self.starts.reserve_exact(parts.clone().map(|p| p.starts.len()).sum());
+        self.carries.reserve_exact(parts.map(|p| p.carries.len()).sum());
     }
 
     /// Appends the paths of another store.

@@ -143,8 +143,7 @@ fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Tec
     let (clusters, mut weights) = (clustered(world, &camera, &light, Areas::None), Weights::default());
     let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
     assert!(weights.weigh(s, Estimator::WholePath, &ON));
-    let segments = segments(s, &weights);
-    let paths = WholePaths { s, w: &weights, segments: &segments, rests: rests(s, &weights) };
+    let paths = WholePaths { s, w: &weights, rests: rests(s, &weights) };
     let mut at = Prefix { throughput: Vec3::ONE, bounces: 0, is_first: true, back: 0.0 };
     for i in start..last {
         let near = paths.near(i, &at, camera.outgoing.get(i).direction);
