@@ -263,7 +263,7 @@ impl Segment {
         costs.stage("areas", 0);
         self.octaves.clear();
         self.octaves.extend(self.primaries.iter().map(|p| match p.arrival {
-            Some(a) => grid.octaves(self.samples.camera.arrivals.get(a as usize).position),
+            Some(a) => grid.octaves(self.samples.camera.arrivals.position(a as usize)),
             None => 0.0,
         }));
         context.counters.segments.fetch_max(self.segments() as u64, Relaxed);

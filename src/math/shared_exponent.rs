@@ -1,15 +1,17 @@
 //! Colours in six bytes: three mantissas of 13 bits and one exponent, that of the largest.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 /// Bits of a mantissa.
 const BITS: i32 = 13;
 /// The largest.
-const FULL: u64 = (1 << BITS) - 1;
+const FULL: u32 = (1 << BITS) - 1;
 /// Exponents, of which one is added: zero is that of black.
 const LEAST: i32 = -126;
 /// That of what is not finite.
-const NOT_FINITE: u64 = 511;
+const NOT_FINITE: u32 = 511;
+/// Octaves by which small numbers are raised on their way.
+const RAISE: i32 = 64;
 
 /// A colour without negative components, of any scale that `f32` has: each to within `2^-13` (1.2e-4) of the largest, rounded
 /// to nearest, so that errors cancel in sums (and to within 8e-43). What is not finite stays so, all of it; what is negative becomes zero.
@@ -21,18 +23,20 @@ impl SharedExponent {
     #[inline]
     pub fn encode(c: Vec3) -> Self {
         if !c.is_finite() {
-            return Self::from_bits(NOT_FINITE << (3 * BITS));
+            return Self::pack([0; 3], NOT_FINITE);
         }
         let largest = c.max_element();
         if largest <= 0.0 {
             return Self::default();
         }
+        let c = c.max(Vec3::ZERO);
         // the least that is more than the largest component; of denormal numbers, that of the least normal one
-        let mut exponent = (largest.to_bits() >> 23) as i32 - 126;
-        exponent = exponent.max(LEAST);
+        let mut exponent = ((largest.to_bits() >> 23) as i32 - 126).max(LEAST);
+        // those of small numbers would have no scale
+        let (c, raised) = if exponent < -RAISE { (c * power(RAISE), RAISE) } else { (c, 0) };
         let round = |exponent: i32| {
-            let scaled = c.max(Vec3::ZERO).as_dvec3() * power(BITS - exponent) + 0.5;
-            scaled.to_array().map(|m| m as u64)
+            let scaled = c * power(BITS - exponent - raised) + 0.5;
+            scaled.to_array().map(|m| m as i32 as u32)
         };
         let mut mantissas = round(exponent);
         if mantissas.iter().any(|&m| m > FULL) {
@@ -43,40 +47,43 @@ impl SharedExponent {
                 mantissas = mantissas.map(|m| m.min(FULL));
             }
         }
-        let [r, g, b] = mantissas;
-        let exponent = (exponent - LEAST + 1) as u64;
-        Self::from_bits(r | g << BITS | b << (2 * BITS) | exponent << (3 * BITS))
+        Self::pack(mantissas, (exponent - LEAST + 1) as u32)
     }
 
     /// The colour.
     #[inline]
     pub fn decode(self) -> Vec3 {
-        let [low, middle, high] = self.0.map(u64::from);
-        let bits = low | middle << 16 | high << 32;
-        let exponent = bits >> (3 * BITS);
+        let [low, middle, high] = self.0.map(u32::from);
+        let mantissas = [low & FULL, (low >> BITS | middle << 3) & FULL, (middle >> 10 | high << 6) & FULL];
+        let exponent = high >> 7;
         if exponent == NOT_FINITE {
             return Vec3::NAN;
         }
-        let mantissa = |k: i32| (bits >> (k * BITS) & FULL) as f64;
-        let scale = power(exponent as i32 - 1 + LEAST - BITS);
-        (DVec3::new(mantissa(0), mantissa(1), mantissa(2)) * scale).as_vec3()
+        let c = Vec3::from(mantissas.map(|m| m as i32 as f32));
+        let exponent = exponent as i32 - 1 + LEAST - BITS;
+        match exponent < LEAST {
+            true => c * power(exponent + RAISE) * power(-RAISE),
+            false => c * power(exponent),
+        }
     }
 
-    fn from_bits(bits: u64) -> Self {
-        Self([bits as u16, (bits >> 16) as u16, (bits >> 32) as u16])
+    #[inline]
+    fn pack([r, g, b]: [u32; 3], exponent: u32) -> Self {
+        Self([(r | g << BITS) as u16, (g >> 3 | b << 10) as u16, (b >> 6 | exponent << 7) as u16])
     }
 }
 
-/// `2^n`, of `n` far within the range of `f64`.
+/// `2^n`, of `n` in the range of normal `f32`.
 #[inline]
-fn power(n: i32) -> f64 {
-    f64::from_bits(((n + 1023) as u64) << 52)
+fn power(n: i32) -> f32 {
+    f32::from_bits(((n + 127) as u32) << 23)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::sampler::hash_unit;
+    use glam::DVec3;
 
     fn there_and_back(c: Vec3) -> Vec3 {
         SharedExponent::encode(c).decode()

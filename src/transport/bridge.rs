@@ -217,14 +217,14 @@ impl Bridges {
         let end = s.cluster_of(s.camera.arrivals.len() + j);
         let onward = match end.class {
             SurfaceClass::Diffuse => {
-                let q = s.lights(end).map(|t| s.light.arrivals.get(t).survival).sum::<f32>();
-                let own = s.lights(end).filter(|t| s.light.photons.get(*t).path == photon.path);
-                let own = own.map(|t| s.light.arrivals.get(t).survival).sum::<f32>();
+                let q = s.lights(end).map(|t| s.light.arrivals.survival(t)).sum::<f32>();
+                let own = s.lights(end).filter(|t| s.light.photons.path(*t) == photon.path);
+                let own = own.map(|t| s.light.arrivals.survival(t)).sum::<f32>();
                 (q - own).max(0.0) * there.bsdf.continuous_pdf(l.wo, -direction).0
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => s
                 .lights(end)
-                .filter(|t| s.light.photons.get(*t).path != photon.path)
+                .filter(|t| s.light.photons.path(*t) != photon.path)
                 .map(|t| {
                     let other = s.light.arrivals.get(t);
                     other.survival * other.bsdf(s.world).continuous_pdf(other.wo, -direction).0

@@ -114,6 +114,16 @@ impl Numbered<'_> {
         if i < self.camera.len() { self.camera.get(i) } else { self.light.get(i - self.camera.len()) }
     }
 
+    /// Instance of arrival number `i`, and triangle of its mesh.
+    #[inline]
+    fn triangle(&self, i: u32) -> (u32, u32) {
+        let i = i as usize;
+        match i < self.camera.len() {
+            true => self.camera.triangle(i),
+            false => self.light.triangle(i - self.camera.len()),
+        }
+    }
+
     fn len(&self) -> usize {
         self.camera.len() + self.light.len()
     }
@@ -312,7 +322,7 @@ fn measure(
     }
     let cell = Cell { grid, voxel, representative: &representative, parted: piece.parted };
     let hub = Hub::new(grid, &representative);
-    let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)));
+    let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.triangle(i)));
     let mut probes = 0;
     let mut estimate = |points: u32| {
         let is_hidden = |p, n| hub.is_hidden(world, p, n);

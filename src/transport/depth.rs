@@ -75,7 +75,7 @@ impl Reflected {
             let brought = per_index(s, |i| {
                 // light met after k passages has bounced once more on its way
                 let met = emitted(s, w, i, Some(k - 1));
-                let level = levels.back(s.camera.outgoing.get(i).passages).filter(|_| has_end(s, i));
+                let level = levels.back(s.camera.outgoing.passages(i)).filter(|_| has_end(s, i));
                 let end = level.map(|l| (l.carried[i + 1].decode(), l.photons[i + 1].decode()));
                 SharedExponent::encode(self.segments.value(s, i, met, end))
             });

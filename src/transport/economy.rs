@@ -240,9 +240,8 @@ fn of_cluster(o: Outcome, k: usize, worth: &[SharedExponent]) -> PerShare {
     match c.class {
         SurfaceClass::Diffuse => {
             // all arrivals reflect alike: one row, and how much its square counts
-            let reflected = |i: usize| {
-                f64::from((worth[i].decode() * s.camera.arrivals.get(i).reflectance).element_sum())
-            };
+            let reflected =
+                |i: usize| f64::from((worth[i].decode() * s.camera.arrivals.reflectance(i)).element_sum());
             let scale: f64 = s.cameras(c).map(|i| reflected(i).powi(2)).sum();
             let grey = Vec3::splat(1.0 / 3.0);
             let (camera, light): (Vec<usize>, Vec<usize>) = (s.cameras(c).collect(), s.lights(c).collect());
@@ -251,7 +250,7 @@ fn of_cluster(o: Outcome, k: usize, worth: &[SharedExponent]) -> PerShare {
                 let next_event = s.camera.next_events.get(i).map_or(0.0, |n| n.pdf);
                 [grey * next_event, grey * s.camera.outgoing.pdf(i)]
             };
-            add(scale, &row, &|column| grey * s.light.arrivals.get(light[column]).back_pdf);
+            add(scale, &row, &|column| grey * s.light.arrivals.back_pdf(light[column]));
         }
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
             let camera: Vec<usize> = s.cameras(c).collect();
@@ -284,12 +283,12 @@ fn draws(o: Outcome, i: usize) -> Draws {
     let mut draws = Draws::default();
     if let Some(next_event) = s.camera.next_events.get(i) {
         // the densities of the cluster's lobes along it are those of its own, as far as they are alike
-        let p_cam = c.cameras as f32 * s.camera.arrivals.get(i).survival * next_event.pdf;
+        let p_cam = c.cameras as f32 * s.camera.arrivals.survival(i) * next_event.pdf;
         let density = next_event_density(&next_event, p_cam, c);
         let light = next_event.light / (density * c.area);
         draws.next_event = Item { light, share: next_event.light_density / density };
     }
-    if !s.camera.arrivals.get(i).goes_on {
+    if !s.camera.arrivals.goes_on(i) {
         return draws;
     }
     draws.emitted = Item { light: segments.emitted(i) / c.area, share: emitted_share(s, w, i) };

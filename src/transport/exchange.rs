@@ -129,16 +129,17 @@ impl Segments {
 pub(super) fn along_path(s: Sampled, w: &Weights, i: usize) -> Vec3 {
     let (cluster, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
     let c = &s.clusters.clusters[cluster];
-    let (a, pdf) = (s.camera.arrivals.get(i), s.camera.outgoing.pdf(i));
+    let pdf = s.camera.outgoing.pdf(i);
     let (f, within) = match c.class {
-        SurfaceClass::Diffuse => (a.reflectance * pdf, 1.0),
+        SurfaceClass::Diffuse => (s.camera.arrivals.reflectance(i) * pdf, 1.0),
         // paired values have it within
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
             let row = (place - c.first) as usize;
             (w.row(cluster, row)[row].decode(), w.apart(place))
         }
     };
-    let continuation = w.densities[place as usize].camera * reciprocal(a.survival * pdf * within);
+    let continuation =
+        w.densities[place as usize].camera * reciprocal(s.camera.arrivals.survival(i) * pdf * within);
     f * (continuation / c.area)
 }
 
@@ -209,7 +210,7 @@ pub(super) fn reflect<T: Default + Send>(
             SurfaceClass::Diffuse => {
                 let apart = w.apart(s.clusters.place[i]);
                 let arriving = if apart == 1.0 { shared[k] } else { of_others(i, c, apart) };
-                s.camera.arrivals.get(i).reflectance * arriving
+                s.camera.arrivals.reflectance(i) * arriving
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let f = w.row(k, (s.clusters.place[i] - c.first) as usize);

@@ -101,20 +101,20 @@ fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
     let arrivals = worth_of_arrivals(o, |_| 1.0);
     let shared = per_diffuse_cluster(s, cut, |c| {
         let reflecting =
-            s.cameras(c).map(|i| (arrivals[i].decode() * s.camera.arrivals.get(i).reflectance).as_dvec3());
+            s.cameras(c).map(|i| (arrivals[i].decode() * s.camera.arrivals.reflectance(i)).as_dvec3());
         reflecting.sum::<DVec3>().as_vec3()
     });
     let values = photon_values(s, w);
     let cameras = s.camera.arrivals.len();
     let of_photon = |j: usize| {
-        if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons.get(j).bounces >= most) {
+        if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons.bounces(j) >= most) {
             return 0.0;
         }
         let place = s.clusters.place[cameras + j];
         let k = s.clusters.of[cameras + j] as usize;
         let c = &s.clusters.clusters[k];
         let reflected = match c.class {
-            SurfaceClass::Diffuse => shared[k] * s.light.arrivals.get(j).back_pdf,
+            SurfaceClass::Diffuse => shared[k] * s.light.arrivals.back_pdf(j),
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let column = (place - c.first) as usize;
                 s.cameras(c)
@@ -153,7 +153,7 @@ pub(super) fn worth_of_arrivals(o: Outcome, spread: impl Fn(&Cluster) -> f32 + S
                     break;
                 }
                 along *= along_path(s, w, i) * constants.carry(s, i) * spread(s.cluster_of(i));
-                bounces = bounces.saturating_add(1 + s.camera.outgoing.get(i).passages);
+                bounces = bounces.saturating_add(1 + s.camera.outgoing.passages(i));
             }
         }
         worth

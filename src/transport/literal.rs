@@ -104,7 +104,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
         LightSegment {
             emitted: Vec3::ZERO,
             carry: carry.throughput * reciprocal(light + p_camera / s.cluster_of(n + j).area),
-            passages: photon.bounces.saturating_sub(s.light.photons.get(before).bounces + 1),
+            passages: photon.bounces.saturating_sub(s.light.photons.bounces(before) + 1),
         }
     };
     (0..s.light.photons.len()).into_par_iter().with_min_len(GRAIN).map(one).collect()
@@ -126,7 +126,7 @@ impl Recursion<'_> {
         let Self { s, w, segments, photons } = self;
         let n = s.camera.arrivals.len();
         let leaving = |i: usize| {
-            let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing.get(i).passages), Vec3::ZERO));
+            let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing.passages(i)), Vec3::ZERO));
             segments.value(*s, i, emitted(*s, w, i, most), end)
         };
         let brought = |j: usize| {
@@ -140,11 +140,11 @@ impl Recursion<'_> {
         let values: Vec<Vec3> = numbers().map(|i| if i < n { leaving(i) } else { brought(i - n) }).collect();
         let shared = per_diffuse_cluster(*s, cut, |c| {
             let cameras = s.cameras(c).map(|i| (values[i] * s.camera.outgoing.pdf(i)).as_dvec3());
-            let lights = s.lights(c).map(|j| (values[n + j] * s.light.arrivals.get(j).back_pdf).as_dvec3());
+            let lights = s.lights(c).map(|j| (values[n + j] * s.light.arrivals.back_pdf(j)).as_dvec3());
             (cameras.sum::<DVec3>() + lights.sum::<DVec3>()).as_vec3() / c.area
         });
         let reflected = |i: usize| {
-            if cut.is_raised() || (i >= n && s.light.photons.get(i - n).pdf <= 0.0) {
+            if cut.is_raised() || (i >= n && s.light.photons.pdf(i - n) <= 0.0) {
                 return Vec3::ZERO;
             }
             let (k, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
@@ -170,11 +170,7 @@ impl Recursion<'_> {
 
     fn reflectance(&self, i: usize) -> Vec3 {
         let n = self.s.camera.arrivals.len();
-        if i < n {
-            self.s.camera.arrivals.get(i).reflectance
-        } else {
-            self.s.light.arrivals.get(i - n).reflectance
-        }
+        if i < n { self.s.camera.arrivals.reflectance(i) } else { self.s.light.arrivals.reflectance(i - n) }
     }
 
     /// `1 / n^2` on the side to which arrival `i` reflects.

@@ -23,13 +23,13 @@ struct Member {
 impl Member {
     fn of_camera(s: Sampled, i: usize) -> Self {
         let arrival = s.camera.arrivals.get(i);
-        let leaves = arrival.goes_on.then(|| s.camera.outgoing.get(i).direction);
+        let leaves = arrival.goes_on.then(|| s.camera.outgoing.direction(i));
         Self { number: i, arrival, bsdf: arrival.bsdf(s.world), leaves }
     }
 
     fn of_light(s: Sampled, j: usize) -> Self {
         let arrival = s.light.arrivals.get(j);
-        let leaves = arrival.goes_on.then(|| s.light.photons.get(j).direction);
+        let leaves = arrival.goes_on.then(|| s.light.photons.direction(j));
         Self { number: j, arrival, bsdf: arrival.bsdf(s.world), leaves }
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
         Rivals::Later { light_choices, squeeze } => {
             let before = s.cluster_of(i - 1);
             let p_light = w.densities[s.clusters.place[i - 1] as usize].light;
-            let straight = photon.bounces == s.light.photons.get(j - 1).bounces + 1;
+            let straight = photon.bounces == s.light.photons.bounces(j - 1) + 1;
             let bridged = s.bridges.filter(|_| straight).map_or(0.0, |b| {
                 let [x, y] = [j, j - 1].map(|j| s.light.arrivals.get(j));
                 b.others[j - 1].chance * Bridges::density(s, &x, c, &y, before)
@@ -46,7 +46,7 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
 /// Flux over area of a photon, times its weight.
 pub(super) fn photon_value(s: Sampled, w: &Weights, j: usize) -> Vec3 {
     let c = s.cluster_of(s.camera.arrivals.len() + j);
-    s.light.photons.get(j).flux * (photon_weight(s, w, j) * c.inverse_area)
+    s.light.photons.flux(j) * (photon_weight(s, w, j) * c.inverse_area)
 }
 
 /// What every photon brings to its cluster; nothing where no camera path arrives.
@@ -107,7 +107,7 @@ pub(super) fn gather_photons(
     cut: &Cut,
     wanted: impl Fn(u32) -> bool + Sync,
 ) -> Vec<SharedExponent> {
-    let light = |j: usize| match wanted(s.light.photons.get(j).bounces) {
+    let light = |j: usize| match wanted(s.light.photons.bounces(j)) {
         true => values[j].decode(),
         false => Vec3::ZERO,
     };
@@ -122,7 +122,7 @@ pub(super) fn gather_photons(
         }
         let (mut arriving, mut left_out) = (DVec3::ZERO, DVec3::ZERO);
         for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
-            let value = (light(j) * s.light.arrivals.get(j).back_pdf).as_dvec3();
+            let value = (light(j) * s.light.arrivals.back_pdf(j)).as_dvec3();
             let Others { chance, number } = others(j);
             arriving += value;
             left_out += value.element_sum() * Vec3::new(own, chance, number).as_dvec3();
@@ -154,10 +154,12 @@ pub(super) fn gather_photons(
         let mut over_bridges = Vec3::ZERO;
         match c.class {
             SurfaceClass::Diffuse => {
-                let (a, Shared { arriving, own, others }) = (s.camera.arrivals.get(i), shared[k]);
-                sum = carry(own * a.back_pdf, others) * a.reflectance * arriving;
+                let Shared { arriving, own, others } = shared[k];
+                let arrivals = &s.camera.arrivals;
+                let reflectance = arrivals.reflectance(i);
+                sum = carry(own * arrivals.back_pdf(i), others) * reflectance * arriving;
                 if let Some(light) = &bridged_light {
-                    over_bridges = a.reflectance * light[k];
+                    over_bridges = reflectance * light[k];
                 }
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {

@@ -138,7 +138,7 @@ impl Reflected {
                     break;
                 }
                 let mut light = w.direct(s.clusters.place[i]);
-                if s.camera.arrivals.get(i).goes_on {
+                if s.camera.arrivals.goes_on(i) {
                     let end =
                         has_end(s, i).then(|| (tails[i + 1 - first].decode(), self.photons[i + 1].decode()));
                     let brought = self.segments.value(s, i, self.segments.emitted(i), end);

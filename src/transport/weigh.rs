@@ -107,12 +107,12 @@ impl<'a> Sampled<'a> {
     /// Path of light arrival `j`.
     #[inline]
     pub(super) fn path(&self, j: usize) -> u32 {
-        self.light.photons.get(j).path
+        self.light.photons.path(j)
     }
 
     /// For every light arrival of the cluster, in their order: the sum of `q` over those of its path there.
     pub fn path_survivals(&self, c: &Cluster) -> Vec<f32> {
-        let mut q: Vec<f32> = self.lights(c).map(|j| self.light.arrivals.get(j).survival).collect();
+        let mut q: Vec<f32> = self.lights(c).map(|j| self.light.arrivals.survival(j)).collect();
         self.sum_over_paths(c, &mut q);
         q
     }
@@ -318,8 +318,8 @@ fn rows(c: &Cluster, estimator: Estimator) -> usize {
 
 fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, places: &mut Places, batch: &mut Batch) {
     let sum = |q: &mut dyn Iterator<Item = f32>| q.map(f64::from).sum::<f64>();
-    let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals.get(i).survival)) as f32;
-    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals.get(j).survival)) as f32;
+    let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals.survival(i))) as f32;
+    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals.survival(j))) as f32;
     let mut arriving = DVec3::ZERO;
     for i in s.cameras(c) {
         if let Some(n) = s.camera.next_events.get(i) {
@@ -328,15 +328,15 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, places: &mut Places, b
     }
     let arriving = arriving.as_vec3() / c.area;
     for (row, i) in s.cameras(c).enumerate() {
-        let a = s.camera.arrivals.get(i);
+        let (reflectance, back_pdf) = (s.camera.arrivals.reflectance(i), s.camera.arrivals.back_pdf(i));
         let gathered = Gathered::new(s, c, row);
         if estimator == Estimator::LeaveOneOut && !gathered.is_all() {
-            let q = gathered.arrivals(s, c).map(|i| s.camera.arrivals.get(i).survival);
+            let q = gathered.arrivals(s, c).map(|i| s.camera.arrivals.survival(i));
             places.apart[row] = ratio(q_camera, q.sum());
         }
         let camera = q_camera * s.camera.outgoing.pdf(i);
-        places.densities[row] = Density { camera, light: q_light * a.back_pdf };
-        places.direct[row] = SharedExponent::encode(a.reflectance * arriving);
+        places.densities[row] = Density { camera, light: q_light * back_pdf };
+        places.direct[row] = SharedExponent::encode(reflectance * arriving);
         if let Some(bridges) = s.bridges {
             let b = &bridges.segments[i];
             batch.bridged.push(b.value(q_camera * b.pdf, c));
@@ -344,22 +344,21 @@ fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, places: &mut Places, b
     }
     let rows = c.cameras as usize..;
     for ((row, j), own) in rows.zip(s.lights(c)).zip(s.path_survivals(c)) {
-        let a = s.light.arrivals.get(j);
         let q = match estimator {
             Estimator::LeaveOneOut => (q_light - own).max(0.0),
             Estimator::Literal | Estimator::WholePath => q_light,
         };
         places.densities[row] =
-            Density { camera: q_camera * a.back_pdf, light: q * s.light.photons.get(j).pdf };
+            Density { camera: q_camera * s.light.arrivals.back_pdf(j), light: q * s.light.photons.pdf(j) };
         if estimator == Estimator::Literal {
-            places.direct[row] = SharedExponent::encode(a.reflectance * arriving);
+            places.direct[row] = SharedExponent::encode(s.light.arrivals.reflectance(j) * arriving);
         }
         batch.bridged.extend(s.bridges.map(|_| Vec3::ZERO));
     }
     if estimator == Estimator::WholePath {
         batch.towards_lights.extend(s.cameras(c).map(|i| {
             let pdf = s.camera.next_events.get(i).map_or(0.0, |n| n.pdf);
-            TowardsLight { value: s.camera.arrivals.get(i).reflectance * pdf, camera: q_camera * pdf }
+            TowardsLight { value: s.camera.arrivals.reflectance(i) * pdf, camera: q_camera * pdf }
         }));
         let none = (0..c.lights).map(|_| TowardsLight::default());
         batch.towards_lights.extend(none);

@@ -192,13 +192,11 @@ impl WholePaths<'_> {
         while at.bounces < most {
             let bounces = at.bounces + 1;
             add(bounces, at.throughput * self.next_event(i, &at));
-            self.join(i, &at, |j, light| {
-                add(bounces + s.light.photons.get(j).bounces, at.throughput * light)
-            });
-            if !s.camera.arrivals.get(i).goes_on {
+            self.join(i, &at, |j, light| add(bounces + s.light.photons.bounces(j), at.throughput * light));
+            if !s.camera.arrivals.goes_on(i) {
                 break;
             }
-            let near = self.near(i, &at, s.camera.outgoing.get(i).direction);
+            let near = self.near(i, &at, s.camera.outgoing.direction(i));
             for hit in self.hits(i) {
                 add(bounces + hit.passages, at.throughput * self.hit(&hit, near));
             }
@@ -245,8 +243,7 @@ impl WholePaths<'_> {
     /// The same, reflected at the arrival and weighed.
     fn hit(&self, hit: &EmissionHit, near: f32) -> Vec3 {
         let i = hit.arrival as usize;
-        let density =
-            hit.forward * self.s.camera.arrivals.get(i).survival * self.s.camera.outgoing.get(i).pdf;
+        let density = hit.forward * self.s.camera.arrivals.survival(i) * self.s.camera.outgoing.get(i).pdf;
         self.value_leaving(i) * hit.light * (self.hit_weight(hit, near) * reciprocal(density))
     }
 
@@ -268,12 +265,12 @@ impl WholePaths<'_> {
         let near = self.joined_near(i, at);
         let scale = c.inverse_area * s.camera.inverse_n2(i);
         let mut photon = |j: usize, value: Vec3| {
-            found(j, value * s.light.photons.get(j).flux * (self.join_weight(j, at, near) * scale));
+            found(j, value * s.light.photons.flux(j) * (self.join_weight(j, at, near) * scale));
         };
         match c.class {
             SurfaceClass::Diffuse => {
-                let reflectance = s.camera.arrivals.get(i).reflectance;
-                s.lights(c).for_each(|j| photon(j, reflectance * s.light.arrivals.get(j).back_pdf));
+                let reflectance = s.camera.arrivals.reflectance(i);
+                s.lights(c).for_each(|j| photon(j, reflectance * s.light.arrivals.back_pdf(j)));
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (s.clusters.place[i] - c.first) as usize;
@@ -313,7 +310,7 @@ impl WholePaths<'_> {
         let (s, cluster) = (self.s, self.s.clusters.of[i] as usize);
         let c = &s.clusters.clusters[cluster];
         match c.class {
-            SurfaceClass::Diffuse => s.camera.arrivals.get(i).reflectance * s.camera.outgoing.get(i).pdf,
+            SurfaceClass::Diffuse => s.camera.arrivals.reflectance(i) * s.camera.outgoing.get(i).pdf,
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (s.clusters.place[i] - c.first) as usize;
                 self.w.row(cluster, row)[row].decode()

@@ -71,25 +71,49 @@ impl Packed {
         let normal = self.normal.decode();
         let class = self.class();
         let is_diffuse = class == SurfaceClass::Diffuse;
-        let (wo, reflectance, back_pdf, barycentrics) = match is_diffuse {
-            true => {
-                let steps = reflectance_steps(self.state & BRIGHT != 0);
-                let reflectance = Vec3::from(self.look.map(f32::from)) / steps;
-                (normal, reflectance, f32::from_bits(self.view), Vec2::ZERO)
-            }
-            false => (Octahedral::from_bits(self.view).decode(), Vec3::ZERO, 0.0, barycentrics(self.look)),
+        let (wo, barycentrics) = match is_diffuse {
+            true => (normal, Vec2::ZERO),
+            false => (Octahedral::from_bits(self.view).decode(), barycentrics(self.look)),
         };
         Arrival {
             position: self.position,
             normal,
             wo,
             at: Address { instance: self.instance, triangle: self.triangle, barycentrics },
-            reflectance,
-            back_pdf,
-            survival: f32::from(self.state & SURVIVAL_STEPS) / f32::from(SURVIVAL_STEPS),
+            reflectance: self.reflectance(),
+            back_pdf: self.back_pdf(),
+            survival: self.survival(),
             class,
-            goes_on: self.state & GOES_ON != 0,
+            goes_on: self.goes_on(),
         }
+    }
+
+    #[inline]
+    fn reflectance(&self) -> Vec3 {
+        match self.class() {
+            SurfaceClass::Diffuse => {
+                Vec3::from(self.look.map(f32::from)) / reflectance_steps(self.state & BRIGHT != 0)
+            }
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => Vec3::ZERO,
+        }
+    }
+
+    #[inline]
+    fn back_pdf(&self) -> f32 {
+        match self.class() {
+            SurfaceClass::Diffuse => f32::from_bits(self.view),
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => 0.0,
+        }
+    }
+
+    #[inline]
+    fn survival(&self) -> f32 {
+        f32::from(self.state & SURVIVAL_STEPS) / f32::from(SURVIVAL_STEPS)
+    }
+
+    #[inline]
+    fn goes_on(&self) -> bool {
+        self.state & GOES_ON != 0
     }
 
     #[inline]
@@ -144,6 +168,42 @@ impl Arrivals {
     #[inline]
     pub fn get(&self, i: usize) -> Arrival {
         self.0[i].arrival()
+    }
+
+    /// See [`Arrival::position`].
+    #[inline]
+    pub fn position(&self, i: usize) -> Vec3 {
+        self.0[i].position
+    }
+
+    /// See [`Arrival::reflectance`].
+    #[inline]
+    pub fn reflectance(&self, i: usize) -> Vec3 {
+        self.0[i].reflectance()
+    }
+
+    /// See [`Arrival::back_pdf`].
+    #[inline]
+    pub fn back_pdf(&self, i: usize) -> f32 {
+        self.0[i].back_pdf()
+    }
+
+    /// See [`Arrival::survival`].
+    #[inline]
+    pub fn survival(&self, i: usize) -> f32 {
+        self.0[i].survival()
+    }
+
+    /// See [`Arrival::goes_on`].
+    #[inline]
+    pub fn goes_on(&self, i: usize) -> bool {
+        self.0[i].goes_on()
+    }
+
+    /// Instance of arrival `i`, and triangle of its mesh.
+    #[inline]
+    pub fn triangle(&self, i: usize) -> (u32, u32) {
+        (self.0[i].instance, self.0[i].triangle)
     }
 
     /// All of them.

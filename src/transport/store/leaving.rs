@@ -97,6 +97,18 @@ impl Outgoings {
         self.segments.get(i).map_or(0.0, |s| s.pdf)
     }
 
+    /// Its direction, if there is one.
+    #[inline]
+    pub fn direction(&self, i: usize) -> Vec3 {
+        self.segments.get(i).map_or(Vec3::ZERO, |s| s.direction.decode())
+    }
+
+    /// Dirac lobes that it passes up to its end.
+    #[inline]
+    pub fn passages(&self, i: usize) -> u32 {
+        self.chains.get(i).map_or(0, |c| u32::from(c.passages))
+    }
+
     /// Whether that of arrival `i` ends at the next one.
     #[inline]
     pub fn has_end(&self, i: usize) -> bool {

@@ -2,6 +2,7 @@
 
 use super::{Photon, Rivals};
 use crate::math::{Octahedral, SharedExponent};
+use glam::Vec3;
 
 /// Bits of the number of bounces; the others of the same number say what the rivals are.
 const BOUNCES: u16 = (1 << 14) - 1;
@@ -88,6 +89,36 @@ impl Photons {
         self.0[j].photon()
     }
 
+    /// See [`Photon::path`].
+    #[inline]
+    pub fn path(&self, j: usize) -> u32 {
+        self.0[j].path
+    }
+
+    /// See [`Photon::flux`].
+    #[inline]
+    pub fn flux(&self, j: usize) -> Vec3 {
+        self.0[j].flux.decode()
+    }
+
+    /// See [`Photon::bounces`].
+    #[inline]
+    pub fn bounces(&self, j: usize) -> u32 {
+        u32::from(self.0[j].state & BOUNCES)
+    }
+
+    /// See [`Photon::direction`].
+    #[inline]
+    pub fn direction(&self, j: usize) -> Vec3 {
+        self.0[j].direction.decode()
+    }
+
+    /// See [`Photon::pdf`].
+    #[inline]
+    pub fn pdf(&self, j: usize) -> f32 {
+        self.0[j].pdf
+    }
+
     /// All of them.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Photon> {
         self.0.iter().map(Packed::photon)
@@ -117,7 +148,6 @@ impl Photons {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     #[test]
     fn photons_come_back() {
