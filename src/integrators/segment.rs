@@ -23,7 +23,7 @@ use std::mem::take;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// What the segments of a camera path take until they are in the film, about, bytes.
-const BYTES_PER_PIXEL: u64 = 5120;
+const BYTES_PER_PIXEL: u64 = 2048;
 /// Most light paths for each pixel of a band, so that theirs stay within bounds, too.
 const LIGHT_PATHS_PER_PIXEL: u64 = 4;
 /// Keeps the random numbers of light paths apart from those of pixels.
@@ -337,7 +337,7 @@ impl Segment {
         self.primaries.clear();
         self.first_hits.clear();
         self.starts.clear();
-        let pixels = context.crop.area() as usize;
+        let pixels = context.crop.area();
         self.primaries.reserve_exact(pixels);
         self.starts.reserve_exact(pixels);
         self.first_hits.reserve_exact(if wants_first_hits { pixels } else { 0 });

@@ -256,7 +256,7 @@ mod tests {
             back_pdf: if is_diffuse { u(10) } else { 0.0 },
             survival: storable_survival(u(11)),
             class,
-            goes_on: k % 2 == 0,
+            goes_on: k.is_multiple_of(2),
         }
     }
 
