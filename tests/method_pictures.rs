@@ -15,7 +15,7 @@ use segue::transport::cluster::{Clusters, Numbered};
 use segue::transport::grid::Grid;
 use segue::transport::kernel::Kernel;
 use segue::transport::light::LightSampler;
-use segue::transport::store::{CameraStore, LightStore};
+use segue::transport::store::{Arrivals, CameraStore, LightStore};
 use segue::transport::{Cut, Estimator};
 use std::fs;
 use std::path::Path;
@@ -98,7 +98,7 @@ fn seen(world: &World, sensor: &Sensor) -> (CameraStore, Vec<Primary>) {
     let sampler = CameraSampler { goes_on: false, ..sampler(world, sensor) };
     let pixels = (0..SIDE * SIDE).map(|k| Vec2::new((k % SIDE) as f32 + 0.5, (k / SIDE) as f32 + 0.5));
     let primaries = pixels
-        .map(|p| sampler.path(&sensor.ray(p, Vec2::ZERO), &mut Sampler::new(0, 0, 0), &mut store, &mut 0))
+        .map(|p| sampler.path(&sensor.ray(p, Vec2::ZERO), &mut Sampler::new(0, 0, 0), &mut store, &mut 0).0)
         .collect();
     (store, primaries)
 }
@@ -121,13 +121,18 @@ fn cluster_maps() {
         let edge = 3.0 * Kernel::default().edge(iteration);
         let grid = Grid::new(&sensor, edge, iteration);
         let mut clusters = Clusters::default();
-        assert!(clusters.group(&world, &grid, Numbered { camera: &store.arrivals, light: &[] }, &cut));
+        assert!(clusters.group(
+            &world,
+            &grid,
+            Numbered { camera: &store.arrivals, light: &Arrivals::default() },
+            &cut
+        ));
         let color = |p: &Primary| match p.arrival {
             None => Vec3::ONE,
             Some(a) => {
                 let id = clusters.of[a as usize];
                 let tint = Vec3::new(hash_unit(id, 1), hash_unit(id, 2), hash_unit(id, 3));
-                (Vec3::splat(0.35) + 0.65 * tint) * shade(store.arrivals[a as usize].normal)
+                (Vec3::splat(0.35) + 0.65 * tint) * shade(store.arrivals.get(a as usize).normal)
             }
         };
         Canvas(primaries.iter().map(color).collect()).write(&format!("clusters_{}.ppm", iteration + 1));
@@ -143,7 +148,7 @@ fn segment_graph() {
     let (store, primaries) = seen(&world, &sensor);
     let color = |p: &Primary| match p.arrival {
         None => Vec3::ONE,
-        Some(a) => Vec3::splat(0.75 + 0.25 * shade(store.arrivals[a as usize].normal)),
+        Some(a) => Vec3::splat(0.75 + 0.25 * shade(store.arrivals.get(a as usize).normal)),
     };
     let mut canvas = Canvas(primaries.iter().map(color).collect());
     let (z, up) = ((EYE - TARGET).normalize().as_vec3(), Vec3::Z);
@@ -165,8 +170,9 @@ fn segment_graph() {
         let ray = CameraRay { origin: eye, direction, range: [0.0, f32::INFINITY] };
         let first = camera.arrivals.len();
         sampler(&world, &small).path(&ray, &mut Sampler::new(7, k, 0), &mut camera, &mut 0);
-        if let Some(a) = camera.arrivals.get(first) {
-            canvas.line(project(eye), project(a.position), Vec3::new(0.45, 0.55, 0.85));
+        if first < camera.arrivals.len() {
+            let seen = camera.arrivals.get(first).position;
+            canvas.line(project(eye), project(seen), Vec3::new(0.45, 0.55, 0.85));
         }
     }
     let lights = LightSampler {
@@ -179,20 +185,21 @@ fn segment_graph() {
     (0..12).for_each(|k| lights.path(k, &mut Sampler::new(9, 0, k), &mut light, &mut 0));
     let lamp = (1.9 - EYE.z) as f32;
     for (i, a) in camera.arrivals.iter().enumerate() {
-        let n = &camera.next_events[i];
-        if n.next_event_pdf > 0.0 && n.direction.z > 0.0 {
+        if let Some(n) = camera.next_events.get(i).filter(|n| n.direction.z > 0.0) {
             let there = a.position + n.direction * ((lamp - a.position.z) / n.direction.z);
             canvas.line(project(a.position), project(there), Vec3::new(0.93, 0.8, 0.25));
         }
     }
-    for (i, _) in camera.outgoing.iter().enumerate().filter(|(_, o)| o.forward > 0.0) {
-        let [a, b] = [i, i + 1].map(|k| project(camera.arrivals[k].position));
+    for i in (0..camera.outgoing.len()).filter(|&i| camera.outgoing.has_end(i)) {
+        let [a, b] = [i, i + 1].map(|k| project(camera.arrivals.get(k).position));
         canvas.line(a, b, Vec3::new(0.1, 0.25, 0.75));
     }
     for (j, a) in light.arrivals.iter().enumerate() {
-        let from = match light.photons[j].bounces {
-            0 => a.position + a.wo * ((lamp - a.position.z) / a.wo.z),
-            _ => light.arrivals[j - 1].position,
+        let photon = light.photons.get(j);
+        let from = match photon.bounces {
+            // its first ray again
+            0 => world.sample_emission(&PLAIN, &mut Sampler::new(9, 0, photon.path)).unwrap().origin(),
+            _ => light.arrivals.get(j - 1).position,
         };
         canvas.line(project(from), project(a.position), Vec3::new(0.85, 0.3, 0.1));
     }

@@ -55,6 +55,8 @@ pub struct Counters {
     pub dropped: AtomicU64,
     /// The graph of the segment method, from the last iteration in which it was looked at (its last band).
     pub graph: Mutex<Option<Report>>,
+    /// The most that an iteration held at a time, bytes, where an integrator tells.
+    pub held: AtomicU64,
     /// Seconds spent in each stage, and the bytes that it holds.
     pub stages: Mutex<BTreeMap<&'static str, (f64, u64)>>,
 }
@@ -74,6 +76,11 @@ impl<'a> StageCosts<'a> {
     /// The first stage begins.
     pub fn new(counters: &'a Counters) -> Self {
         Self { counters, since: Instant::now() }
+    }
+
+    /// So many bytes are held at this moment, or were at the worst one since the last stage.
+    pub fn hold(&self, bytes: usize) {
+        self.counters.held.fetch_max(bytes as u64, Relaxed);
     }
 
     /// A stage ends, and holds `bytes` of memory; the next begins.
@@ -155,22 +162,45 @@ const GLANCE_STREAM: u32 = 0x91a9_ce00;
 /// Light paths that one task samples.
 const LIGHT_BATCH: u32 = 1024;
 
+/// Portions in which tasks are done, so that their stores are not all kept beside what they are put together to.
+const PORTIONS: u32 = 16;
+/// Fewest tasks of a portion for each thread: all should have something to do.
+const TASKS_PER_THREAD: u32 = 4;
+
+/// So many tasks, portion by portion.
+fn portions(tasks: u32) -> impl Iterator<Item = Range<u32>> {
+    let least = TASKS_PER_THREAD * rayon::current_num_threads() as u32;
+    let size = tasks.div_ceil(PORTIONS).max(least);
+    (0..tasks).step_by(size as usize).map(move |first| first..tasks.min(first + size))
+}
+
 impl Context<'_> {
     /// Samples so many light paths, batch by batch, each batch into a store of its own. `path` samples the path of a
-    /// number and adds the rays it takes. If it is stopped, the stores are incomplete.
+    /// number and adds the rays it takes; `take` is given the stores in order, some at a time. If it is stopped, they are
+    /// incomplete.
     fn light_batches<S: Default + Send>(
         &self,
         paths: u32,
         path: impl Fn(u32, &mut S, &mut u64) + Sync,
-    ) -> Vec<S> {
-        let batches = (0..paths.div_ceil(LIGHT_BATCH)).into_par_iter();
-        batches.map(|b| self.task(b * LIGHT_BATCH..paths.min((b + 1) * LIGHT_BATCH), &path)).collect()
+        mut take: impl FnMut(Vec<S>),
+    ) {
+        for batches in portions(paths.div_ceil(LIGHT_BATCH)) {
+            let batches = batches.into_par_iter();
+            let one = |b| self.task(b * LIGHT_BATCH..paths.min((b + 1) * LIGHT_BATCH), &path);
+            take(batches.map(one).collect());
+        }
     }
 
     /// The same for one camera path a pixel, row by row; `path` is given the pixel.
-    fn camera_rows<S: Default + Send>(&self, path: impl Fn(u32, u32, &mut S, &mut u64) + Sync) -> Vec<S> {
-        let rows = (0..self.crop.height).into_par_iter();
-        rows.map(|y| self.task(0..self.crop.width, |x, store, rays| path(x, y, store, rays))).collect()
+    fn camera_rows<S: Default + Send>(
+        &self,
+        path: impl Fn(u32, u32, &mut S, &mut u64) + Sync,
+        mut take: impl FnMut(Vec<S>),
+    ) {
+        for rows in portions(self.crop.height) {
+            let one = |y| self.task(0..self.crop.width, |x, store, rays| path(x, y, store, rays));
+            take(rows.into_par_iter().map(one).collect());
+        }
     }
 
     fn task<S: Default>(&self, paths: Range<u32>, path: impl Fn(u32, &mut S, &mut u64)) -> S {

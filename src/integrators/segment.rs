@@ -2,7 +2,7 @@
 
 use super::shown::Shown;
 use super::{Context, Integrator, IterationEnd, StageCosts, locked};
-use crate::film::{Pass, Rect, Sample, SplatBuffer};
+use crate::film::{FirstHit, Pass, Rect, Sample, SplatBuffer};
 use crate::math::sampler::hash;
 use crate::math::{LUMINANCE, Sampler, luminance};
 use crate::shading::World;
@@ -24,7 +24,7 @@ use std::mem::take;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// What the segments of a camera path take until they are in the film, about, bytes.
-const BYTES_PER_PIXEL: u64 = 5120;
+const BYTES_PER_PIXEL: u64 = 2048;
 /// Most light paths for each pixel of a band, so that theirs stay within bounds, too.
 const LIGHT_PATHS_PER_PIXEL: u64 = 4;
 /// Keeps the random numbers of light paths apart from those of pixels.
@@ -63,6 +63,8 @@ pub struct Segment {
     guiding: Guiding,
     /// What every pixel of the band sees, row by row.
     primaries: Vec<Primary>,
+    /// The first surface that every pixel sees, if a pass asks for it.
+    first_hits: Vec<Option<FirstHit>>,
     /// For every pixel of the band, the size of the voxel in which it is filtered, octaves over the kernel's.
     octaves: Vec<f32>,
     /// First arrival of every camera path that has one.
@@ -136,6 +138,7 @@ impl Segment {
         if !self.sample_light(context, index, light_paths as u32, cut) {
             return false;
         }
+        self.forget_band();
         costs.stage("sampling", self.samples.light.bytes());
         let lessons = Lessons {
             guides: self.techniques.emission_guiding
@@ -180,6 +183,7 @@ impl Segment {
             }
             if lessons.guides || lessons.looks {
                 let bytes = self.learn(&of_band, &after, &lessons, cut);
+                costs.hold(self.held() + bytes);
                 costs.stage("learning", bytes);
             }
         }
@@ -240,6 +244,7 @@ impl Segment {
         costs: &mut StageCosts,
     ) -> bool {
         let Context { world, sensor, .. } = *context;
+        self.forget_band();
         if !self.sample_camera(context, index, light_paths, cut) {
             return false;
         }
@@ -261,7 +266,9 @@ impl Segment {
         if !is_done {
             return false;
         }
-        costs.stage("clustering", self.samples.clusters.bytes());
+        let clusters = &self.samples.clusters;
+        costs.hold(self.held() + clusters.most_bytes() - clusters.bytes());
+        costs.stage("clustering", clusters.bytes());
         let areas = match self.techniques.estimator {
             _ if light_paths == 0.0 => Areas::None,
             Estimator::LeaveOneOut | Estimator::WholePath => Areas::OfPhotons,
@@ -273,7 +280,7 @@ impl Segment {
         costs.stage("areas", 0);
         self.octaves.clear();
         self.octaves.extend(self.primaries.iter().map(|p| match p.arrival {
-            Some(a) => grid.octaves(self.samples.camera.arrivals[a as usize].position),
+            Some(a) => grid.octaves(self.samples.camera.arrivals.position(a as usize)),
             None => 0.0,
         }));
         context.counters.segments.fetch_max(self.segments() as u64, Relaxed);
@@ -288,6 +295,7 @@ impl Segment {
         if !self.weights.weigh(sampled, self.techniques.estimator, cut) {
             return false;
         }
+        costs.hold(self.held());
         costs.stage("weights", self.weights.bytes());
         let passes = context.film.passes();
         let wants_direct = passes.contains(Pass::Direct) || passes.contains(Pass::Indirect);
@@ -310,6 +318,7 @@ impl Segment {
                 reflected.solve_limited(sampled, weights, &first(), limit, cut)
             }
         };
+        costs.hold(self.held() + self.reflected.most_bytes() - self.reflected.bytes());
         costs.stage("propagation", self.reflected.bytes());
         context.counters.dropped.fetch_add(self.samples.camera.dropped, Relaxed);
         // figures that hardly change are taken ever more rarely
@@ -339,9 +348,10 @@ impl Segment {
             next_event: self.techniques.next_event,
             goes_on: self.techniques.camera_paths,
         };
-        let rows = context.camera_rows(|x, y, (store, primaries): &mut (CameraStore, Vec<Primary>), rays| {
+        let wants_first_hits = context.film.passes().iter().any(Pass::is_first_hit);
+        let path = |x: u32, y: u32, (store, seen): &mut (CameraStore, Vec<_>), rays: &mut u64| {
             let (ray, mut random) = context.camera_sample(x, y, index);
-            let mut primary = sampler.path(&ray, &mut random, store, rays);
+            let (mut primary, first_hit) = sampler.path(&ray, &mut random, store, rays);
             let more = 1..self.glances.number(x + context.crop.x, y + context.crop.y);
             if !more.is_empty() {
                 primary.average(more.map(|k| {
@@ -349,23 +359,30 @@ impl Segment {
                     sampler.glance(&ray, &mut random, rays)
                 }));
             }
-            primaries.push(primary);
-        });
-        if cut.is_raised() {
-            return false;
-        }
+            seen.push((primary, first_hit));
+        };
         self.samples.camera.clear();
         self.primaries.clear();
+        self.first_hits.clear();
         self.starts.clear();
-        for (mut store, primaries) in rows {
-            let first = self.samples.camera.append(&mut store);
-            for mut p in primaries {
-                p.arrival = p.arrival.map(|a| a + first);
-                self.starts.extend(p.arrival);
-                self.primaries.push(p);
+        let pixels = context.crop.area();
+        self.primaries.reserve_exact(pixels);
+        self.starts.reserve_exact(pixels);
+        self.first_hits.reserve_exact(if wants_first_hits { pixels } else { 0 });
+        let camera = &mut self.samples.camera;
+        context.camera_rows(path, |rows| {
+            camera.reserve(rows.iter().map(|r| &r.0));
+            for (mut store, seen) in rows {
+                let first = camera.append(&mut store);
+                for (mut p, first_hit) in seen {
+                    p.arrival = p.arrival.map(|a| a + first);
+                    self.starts.extend(p.arrival);
+                    self.primaries.push(p);
+                    self.first_hits.extend(wants_first_hits.then_some(first_hit));
+                }
             }
-        }
-        true
+        });
+        !cut.is_raised()
     }
 
     fn sample_light(&mut self, context: &Context, index: u32, paths: u32, cut: &Cut) -> bool {
@@ -376,13 +393,17 @@ impl Segment {
             next_event: self.techniques.next_event,
             estimator: self.techniques.estimator,
         };
-        let batches = context.light_batches(paths, |k, store: &mut LightStore, rays| {
+        let path = |k: u32, store: &mut LightStore, rays: &mut u64| {
             // Leaving one out takes light paths to be independent of each other. Stratified among each other, those of
             // an iteration are not: given one photon, fewer others lie nearby. They are from iteration to iteration.
             sampler.path(k, &mut Sampler::new(context.seed ^ LIGHT_STREAM, k, index), store, rays);
+        };
+        let light = &mut self.samples.light;
+        light.clear();
+        context.light_batches(paths, path, |batches| {
+            light.reserve(batches.iter());
+            batches.into_iter().for_each(|mut store| light.append(&mut store));
         });
-        self.samples.light.clear();
-        batches.into_iter().for_each(|mut store| self.samples.light.append(&mut store));
         !cut.is_raised()
     }
 
@@ -450,6 +471,25 @@ impl Segment {
         self.adaptation.add(&look, light, cut);
     }
 
+    /// Gives back what a band was weighed and solved with.
+    fn forget_band(&mut self) {
+        (self.samples.clusters, self.weights, self.reflected) = Default::default();
+    }
+
+    /// What is held of the iteration now, bytes.
+    fn held(&self) -> usize {
+        self.samples.camera.bytes()
+            + self.samples.light.bytes()
+            + self.samples.clusters.bytes()
+            + self.bridges.bytes()
+            + self.splats.bytes()
+            + self.weights.bytes()
+            + self.reflected.bytes()
+            + self.primaries.capacity() * size_of::<Primary>()
+            + self.first_hits.capacity() * size_of::<Option<FirstHit>>()
+            + (self.starts.capacity() + self.octaves.capacity()) * size_of::<f32>()
+    }
+
     /// Segments of this band.
     fn segments(&self) -> usize {
         self.samples.camera.segments(self.primaries.len()) + self.samples.light.arrivals.len()
@@ -464,7 +504,7 @@ impl Segment {
             let (reflected, direct) = match p.arrival.map(|a| a as usize) {
                 Some(a) => {
                     let direct = self.reflected.direct.get(a).filter(|_| p.passages == 0);
-                    (self.reflected.towards_camera(sampled, a), direct.copied().unwrap_or(Vec3::ZERO))
+                    (self.reflected.towards_camera(sampled, a), direct.map_or(Vec3::ZERO, |d| d.decode()))
                 }
                 None => (Vec3::ZERO, Vec3::ZERO),
             };
@@ -475,7 +515,7 @@ impl Segment {
                 alpha: p.alpha,
                 emission: p.emission,
                 direct: p.mirrored + p.weight * direct.min(reflected) + splatted.direct,
-                first_hit: p.first_hit,
+                first_hit: self.first_hits.get(pixel).copied().flatten(),
             }
         });
         (context.tile_done)(band);

@@ -370,7 +370,9 @@ impl Session {
         let mut stages = self.build.clone();
         let counted = locked(&self.counters.stages);
         let segments = self.counters.segments.load(Relaxed);
-        let held: u64 = counted.values().map(|&(_, bytes)| bytes).sum();
+        let told = self.counters.held.load(Relaxed);
+        let of_stages = || counted.values().map(|&(_, bytes)| bytes).sum();
+        let held: u64 = if told > 0 { told } else { of_stages() };
         for (&name, &(seconds, bytes)) in counted.iter() {
             stages.insert(name.into(), Stage { seconds, bytes });
         }

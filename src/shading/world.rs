@@ -12,7 +12,7 @@ use super::texture::{MeshPoint, interpolate};
 use crate::accel::offset::SurfacePoint as Place;
 use crate::accel::{Accel, AccelError, Hit, InstanceGeometry, MeshGeometry, Ray};
 use crate::scene::{Needs, Scene, SceneError, Warnings};
-use glam::{DVec3, Vec2, Vec2Swizzles, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec2Swizzles, Vec3};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -203,6 +203,21 @@ impl World {
         let Address { instance, triangle, barycentrics } = *at;
         let hit = Hit { t: 0.0, instance, triangle, u: barycentrics.x, v: barycentrics.y };
         SurfacePoint::new(&self.scene, &self.accel, &hit)
+    }
+
+    /// The surface of an instance's triangle at the point nearest to one; barycentrics of the address do not count.
+    pub fn surface_near(&self, at: &Address, point: Vec3) -> SurfacePoint {
+        let corner = |u: f32, v: f32| {
+            let at = Address { barycentrics: Vec2::new(u, v), ..*at };
+            self.surface(&at).place.position.as_dvec3()
+        };
+        let origin = corner(0.0, 0.0);
+        let (a, b, p) = (corner(1.0, 0.0) - origin, corner(0.0, 1.0) - origin, point.as_dvec3() - origin);
+        let (aa, ab, bb, pa, pb) = (a.dot(a), a.dot(b), b.dot(b), p.dot(a), p.dot(b));
+        let scale = 1.0 / (aa * bb - ab * ab);
+        let uv = DVec2::new(pa * bb - pb * ab, pb * aa - pa * ab) * scale;
+        let uv = if uv.is_finite() { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { DVec2::splat(1.0 / 3.0) };
+        self.surface(&Address { barycentrics: uv.as_vec2(), ..*at })
     }
 
     /// Corners of an instance's triangle, scene space, if it has one shading normal.

@@ -11,7 +11,7 @@ use super::Cut;
 use super::camera::Primary;
 use super::grid::Grid;
 use super::sizes::{BLOCK, Sizes, block, blocks};
-use super::store::Arrival;
+use super::store::Arrivals;
 use crate::film::Rect;
 use crate::math::sampler::hash;
 use crate::shading::Sensor;
@@ -107,7 +107,7 @@ pub struct Look<'a> {
     /// What its pixels saw, row by row.
     pub primaries: &'a [Primary],
     /// Arrivals of the camera's paths.
-    pub arrivals: &'a [Arrival],
+    pub arrivals: &'a Arrivals,
     /// Seed of the grids.
     pub seed: u32,
     /// Iterations with this one.
@@ -194,7 +194,9 @@ impl Adaptation {
                 let seed = hash(seed, (2 * k + g) as u32);
                 let grid = Grid::new(sensor, CANDIDATES[k].exp2(), seed);
                 keys.clear();
-                keys.par_extend(clear.par_iter().map(|&(pixel, a)| (grid.key(&arrivals[a as usize]), pixel)));
+                keys.par_extend(
+                    clear.par_iter().map(|&(pixel, a)| (grid.key(&arrivals.get(a as usize)), pixel)),
+                );
                 // pixels make the order unique, so it does not depend on the threads
                 keys.par_sort_unstable();
                 for voxel in keys.chunk_by(|a, b| a.0 == b.0) {
@@ -266,11 +268,11 @@ fn clear_pixels(look: &Look) -> Vec<(u32, u32)> {
     };
     let clear = |pixel: u32| {
         let (number, passages) = seen(pixel)?;
-        let a = &look.arrivals[number as usize];
+        let a = look.arrivals.get(number as usize);
         let reach = look.sensor.pixel_footprint(a.position);
         let goes_on = |neighbour: u32| {
             seen(neighbour).is_some_and(|(n, p)| {
-                let b = &look.arrivals[n as usize];
+                let b = look.arrivals.get(n as usize);
                 let rise = (b.position - a.position).dot(a.normal).abs();
                 p == passages && a.class == b.class && a.normal.dot(b.normal) > SMOOTH && rise < reach
             })

@@ -45,15 +45,14 @@ impl Cell<'_> {
         edge * edge * unit_plane_cut(p, n)
     }
 
-    /// The exact area where the whole cut lies on one triangle and so do all `members`.
-    pub fn on_one_triangle<'m>(
+    /// The exact area where the whole cut lies on one triangle and so do all members: `triangles`, by instance and number.
+    pub fn on_one_triangle(
         &self,
         world: &World,
-        mut members: impl Iterator<Item = &'m Arrival>,
+        mut triangles: impl Iterator<Item = (u32, u32)>,
     ) -> Option<f32> {
         let r = self.representative;
-        let triangle = |a: &Arrival| (a.at.instance, a.at.triangle);
-        if self.parted.is_some() || !members.all(|a| triangle(a) == triangle(r)) {
+        if self.parted.is_some() || !triangles.all(|t| t == (r.at.instance, r.at.triangle)) {
             return None;
         }
         let (low, edge) = self.grid.place(&self.voxel);

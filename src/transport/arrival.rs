@@ -1,6 +1,6 @@
 //! Ends of segments, made ready for the store.
 
-use super::store::Arrival;
+use super::store::{Arrival, storable_survival};
 use super::walk::End;
 use crate::shading::bsdf::{Bsdf, Sight};
 use crate::shading::{SurfaceClass, World};
@@ -21,7 +21,7 @@ fn survival_of(world: &World, albedo: Vec3, end_probability: f32) -> f32 {
 
 fn bounded(world: &World, albedo: f32) -> f32 {
     // false for NaN
-    if albedo > LEAST { albedo.min(world.most_survival()) } else { LEAST }
+    storable_survival(if albedo > LEAST { albedo.min(world.most_survival()) } else { LEAST })
 }
 
 /// How a path that came to an arrival from `from` would go on back along the segment that ended there: the probability
@@ -36,7 +36,7 @@ pub fn reversed(world: &World, a: &Arrival, from: Vec3) -> (f32, f32) {
 
 /// The same at the first arrivals of a camera path, which decide most of the picture's noise: paths are longer there.
 pub fn early_survival(q: f32) -> f32 {
-    q.sqrt()
+    storable_survival(q.sqrt())
 }
 
 /// The end of a segment as it is stored; `goes_on` is the caller's to set. `sight`: of its continuous lobes from where

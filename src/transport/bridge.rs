@@ -113,7 +113,7 @@ struct Pier {
 
 impl Pier {
     fn new(s: Sampled, a: &Arrival) -> Self {
-        let hit = s.world.surface(&a.at);
+        let hit = a.surface(s.world);
         Self { bsdf: s.world.bsdf(&hit, a.wo), hit }
     }
 
@@ -192,8 +192,8 @@ impl Bridges {
         rays: &mut u64,
     ) -> Option<Bridge> {
         let s = b.sampled;
-        let (a, l, photon) = (&s.camera.arrivals[i], &s.light.arrivals[j], &s.light.photons[j]);
-        let (here, there) = (Pier::new(s, a), Pier::new(s, l));
+        let (a, l, photon) = (s.camera.arrivals.get(i), s.light.arrivals.get(j), s.light.photons.get(j));
+        let (here, there) = (Pier::new(s, &a), Pier::new(s, &l));
         let way = l.position - a.position;
         let square = way.length_squared();
         let direction = way / square.sqrt();
@@ -204,7 +204,7 @@ impl Bridges {
         if !(g > 0.0 && g.is_finite()) || (pdf <= 0.0 && !is_shared) {
             return None;
         }
-        let value = there.value(s, l, -direction);
+        let value = there.value(s, &l, -direction);
         if value == Vec3::ZERO {
             return None;
         }
@@ -217,16 +217,16 @@ impl Bridges {
         let end = s.cluster_of(s.camera.arrivals.len() + j);
         let onward = match end.class {
             SurfaceClass::Diffuse => {
-                let q = s.lights(end).map(|t| s.light.arrivals[t].survival).sum::<f32>();
-                let own = s.lights(end).filter(|t| s.light.photons[*t].path == photon.path);
-                let own = own.map(|t| s.light.arrivals[t].survival).sum::<f32>();
+                let q = s.lights(end).map(|t| s.light.arrivals.survival(t)).sum::<f32>();
+                let own = s.lights(end).filter(|t| s.light.photons.path(*t) == photon.path);
+                let own = own.map(|t| s.light.arrivals.survival(t)).sum::<f32>();
                 (q - own).max(0.0) * there.bsdf.continuous_pdf(l.wo, -direction).0
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => s
                 .lights(end)
-                .filter(|t| s.light.photons[*t].path != photon.path)
+                .filter(|t| s.light.photons.path(*t) != photon.path)
                 .map(|t| {
-                    let other = &s.light.arrivals[t];
+                    let other = s.light.arrivals.get(t);
                     other.survival * other.bsdf(s.world).continuous_pdf(other.wo, -direction).0
                 })
                 .sum(),
@@ -245,7 +245,7 @@ impl Bridges {
     /// What light arrival `j` sends to the lens beside the primary segments that gather it.
     fn to_lens(&self, b: &BridgeSampler, j: usize, rays: &mut u64) -> Option<Splat> {
         let s = b.sampled;
-        let (l, photon) = (&s.light.arrivals[j], &s.light.photons[j]);
+        let (l, photon) = (s.light.arrivals.get(j), s.light.photons.get(j));
         let bounces = photon.bounces + 1;
         if b.max_depth.is_some_and(|most| bounces > most) {
             return None;
@@ -255,8 +255,8 @@ impl Bridges {
             false => Vec2::ZERO,
         };
         let view = b.sensor.view(l.position, lens).filter(|v| is_wanted(v.film, b.filter, b.crop))?;
-        let pier = Pier::new(s, l);
-        let value = pier.value(s, l, view.direction);
+        let pier = Pier::new(s, &l);
+        let value = pier.value(s, &l, view.direction);
         if value == Vec3::ZERO {
             return None;
         }
@@ -275,7 +275,7 @@ impl Bridges {
         let way = y.position - x.position;
         let square = way.length_squared();
         let direction = way / square.sqrt();
-        let cos = |a: &Arrival| s.world.surface(&a.at).place.normal.dot(direction).abs();
+        let cos = |a: &Arrival| a.surface(s.world).place.normal.dot(direction).abs();
         let g = cos(x) * cos(y) / square;
         let density = here.cameras as f32 / (here.area * end.area * g);
         // segments that graze a surface are left to those who walk

@@ -45,8 +45,6 @@ pub struct Primary {
     pub square: f32,
     /// See `glances`.
     pub rays: u32,
-    /// The first surface on it.
-    pub first_hit: Option<FirstHit>,
 }
 
 impl Primary {
@@ -64,7 +62,6 @@ impl Primary {
         glances: 0,
         square: 0.0,
         rays: 0,
-        first_hit: None,
     };
 
     /// Takes the light of others into its means.
@@ -105,6 +102,7 @@ pub struct CameraSampler<'a> {
 struct Seeing<'a> {
     sampler: &'a CameraSampler<'a>,
     primary: &'a mut Primary,
+    first_hit: Option<FirstHit>,
 }
 
 impl Seeing<'_> {
@@ -140,7 +138,7 @@ impl Witness for Seeing<'_> {
 
     fn surface(&mut self, hit: &SurfacePoint, vertex: &Vertex, wo: Vec3) {
         let CameraSampler { world, sensor, .. } = self.sampler;
-        self.primary.first_hit.get_or_insert_with(|| world.first_hit(sensor, hit, vertex, wo));
+        self.first_hit.get_or_insert_with(|| world.first_hit(sensor, hit, vertex, wo));
     }
 
     fn escaped(&mut self, chain: &Chain) {
@@ -148,6 +146,14 @@ impl Witness for Seeing<'_> {
             self.primary.alpha = 1.0 - chain.throughput.element_sum() / 3.0;
         }
     }
+}
+
+/// A primary segment.
+struct Beginning {
+    primary: Primary,
+    first_hit: Option<FirstHit>,
+    chain: Chain,
+    end: Option<End>,
 }
 
 /// Collects the light that a segment meets after it left an arrival.
@@ -205,16 +211,17 @@ impl Witness for Meeting<'_> {
 }
 
 impl CameraSampler<'_> {
-    /// Samples the path of one camera ray into the store. Adds the rays it takes to `rays`.
+    /// Samples the path of one camera ray into the store. Adds the rays it takes to `rays`. Returns what the pixel sees, and
+    /// the first surface on the way.
     pub fn path(
         &self,
         ray: &CameraRay,
         sampler: &mut Sampler,
         store: &mut CameraStore,
         rays: &mut u64,
-    ) -> Primary {
-        let (mut primary, chain, end) = self.primary(ray, sampler, rays);
-        let Some(mut end) = end else { return primary };
+    ) -> (Primary, Option<FirstHit>) {
+        let Beginning { mut primary, first_hit, chain, end } = self.primary(ray, sampler, rays);
+        let Some(mut end) = end else { return (primary, first_hit) };
         let first = store.arrivals.len();
         primary.arrival = Some(first as u32);
         primary.weight = chain.throughput / chain.forward;
@@ -225,6 +232,7 @@ impl CameraSampler<'_> {
         let mut inverse_n2 = 1.0 / (chain.index * chain.index);
         let mut own = OwnPath::new(chain.passages, self.max_depth);
         let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: false };
+        let mut met = Vec::new();
         loop {
             let index = store.arrivals.len();
             let sight = end.sight();
@@ -249,25 +257,22 @@ impl CameraSampler<'_> {
             store.dropped += u64::from(!sound);
             let next_event = if sound { next_event } else { NextEvent::default() };
             own.see_next_event(&next_event, arrived.survival, value);
-            store.next_events.push(next_event);
-            store.inverse_n2.push(inverse_n2);
             let u = sampler.next_3d();
             let goes_on = sampler.next_1d() < arrived.survival;
             let sample = if goes_on { sight.and_then(|s| s.sample(Walk::Camera, u)) } else { None };
             arrived.goes_on = sample.is_some();
             let survival = arrived.survival;
-            store.arrivals.push(arrived);
             let Some(sample) = sample else {
-                store.outgoing.push(Outgoing::default());
+                store.push(arrived, inverse_n2, next_event, Outgoing::default());
                 break;
             };
             let direction = sample.direction;
             let start_n2 = inverse_n2 / (sample.eta * sample.eta);
             let light_end = end.probability_from(self.world, direction);
-            let met = store.hits.len();
+            met.clear();
             let mut meeting = Meeting {
                 world: self.world,
-                hits: &mut store.hits,
+                hits: &mut met,
                 dropped: &mut store.dropped,
                 arrival: index as u32,
                 receiver,
@@ -280,10 +285,11 @@ impl CameraSampler<'_> {
             let piece = Piece::leaving(&end.hit, direction);
             let (chain, next) = follow.segment(piece, sampler, &mut meeting, rays);
             let density = survival * sample.pdf.value();
-            own.meet(&store.hits[met..], sample.value, density);
+            own.meet(&met, sample.value, density);
+            met.drain(..).for_each(|hit| store.hits.push(hit));
             own.go_on(&chain, sample.value, density);
             let squeeze = 1.0 / (chain.index * chain.index);
-            store.outgoing.push(Outgoing {
+            let outgoing = Outgoing {
                 direction,
                 pdf: sample.pdf.value(),
                 throughput: chain.throughput,
@@ -291,7 +297,8 @@ impl CameraSampler<'_> {
                 reverse: chain.reverse * light_end,
                 squeeze,
                 passages: chain.passages,
-            });
+            };
+            store.push(arrived, inverse_n2, next_event, outgoing);
             match next {
                 Some(e) => end = e,
                 None => break,
@@ -299,28 +306,24 @@ impl CameraSampler<'_> {
             inverse_n2 = start_n2 * squeeze;
         }
         primary.unfiltered = own.light;
-        primary
+        (primary, first_hit)
     }
 
     /// What is seen on a primary segment alone.
     pub fn glance(&self, ray: &CameraRay, sampler: &mut Sampler, rays: &mut u64) -> Primary {
-        self.primary(ray, sampler, rays).0
+        self.primary(ray, sampler, rays).primary
     }
 
-    fn primary(
-        &self,
-        ray: &CameraRay,
-        sampler: &mut Sampler,
-        rays: &mut u64,
-    ) -> (Primary, Chain, Option<End>) {
+    fn primary(&self, ray: &CameraRay, sampler: &mut Sampler, rays: &mut u64) -> Beginning {
         let mut primary = Primary { glances: 1, ..Primary::NOTHING };
         let before = *rays;
         let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: true };
-        let mut seeing = Seeing { sampler: self, primary: &mut primary };
+        let mut seeing = Seeing { sampler: self, primary: &mut primary, first_hit: None };
         let (chain, end) = follow.segment(Piece::from_camera(ray), sampler, &mut seeing, rays);
+        let first_hit = seeing.first_hit;
         primary.square = luminance(primary.light).powi(2);
         primary.rays = (*rays - before) as u32;
-        (primary, chain, end)
+        Beginning { primary, first_hit, chain, end }
     }
 
     /// A next-event segment along which light arrives, and the value of the lobes.

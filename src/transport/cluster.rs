@@ -3,7 +3,7 @@
 use super::Cut;
 use super::area::{Cell, FEW_POINTS, MOST_POINTS, POINTS_OF_PHOTONS};
 use super::grid::Grid;
-use super::store::Arrival;
+use super::store::{Arrival, Arrivals};
 use super::unseen::{self, UNSEEN};
 use crate::math::sampler::hash;
 use crate::shading::{SurfaceClass, World};
@@ -37,6 +37,11 @@ pub struct Cluster {
     pub inverse_area: f32,
     /// Class of its surfaces.
     pub class: SurfaceClass,
+}
+
+/// The piece of a surface that a cluster is; of use until its areas are known.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
     /// Arrival in whose voxel it is.
     representative: u32,
     /// Where something divides the voxel: whether this is the part that the representative does not see.
@@ -46,20 +51,9 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// The empty cluster of arrivals that do not count, of which one is given.
-    fn of_nobody(representative: u32) -> Self {
-        Self {
-            first: 0,
-            cameras: 0,
-            lights: 0,
-            area: 1.0,
-            inverse_area: 0.0,
-            class: SurfaceClass::Diffuse,
-            representative,
-            parted: None,
-            parts: 1,
-        }
-    }
+    /// The empty cluster of arrivals that do not count.
+    const OF_NOBODY: Self =
+        Self { first: 0, cameras: 0, lights: 0, area: 1.0, inverse_area: 0.0, class: SurfaceClass::Diffuse };
 
     /// Places of the camera's arrivals.
     pub fn camera_places(&self) -> Range<usize> {
@@ -97,24 +91,37 @@ pub struct Clusters {
     pub of: Vec<u32>,
     /// Points at which it was looked for surfaces, to find areas.
     pub probes: u64,
-    keys: Vec<(u64, u32)>,
+    /// One for every cluster that is not empty, until the areas are known.
+    pieces: Vec<Piece>,
+    /// The most that was held while arrivals were grouped, bytes.
+    most_bytes: usize,
 }
 
 /// The arrivals of an iteration, by number.
 #[derive(Clone, Copy)]
 pub struct Numbered<'a> {
     /// The camera's.
-    pub camera: &'a [Arrival],
+    pub camera: &'a Arrivals,
     /// The lights'.
-    pub light: &'a [Arrival],
+    pub light: &'a Arrivals,
 }
 
-impl<'a> Numbered<'a> {
+impl Numbered<'_> {
     /// Arrival number `i`.
     #[inline]
-    pub fn get(&self, i: u32) -> &'a Arrival {
+    pub fn get(&self, i: u32) -> Arrival {
         let i = i as usize;
-        if i < self.camera.len() { &self.camera[i] } else { &self.light[i - self.camera.len()] }
+        if i < self.camera.len() { self.camera.get(i) } else { self.light.get(i - self.camera.len()) }
+    }
+
+    /// Instance of arrival number `i`, and triangle of its mesh.
+    #[inline]
+    fn triangle(&self, i: u32) -> (u32, u32) {
+        let i = i as usize;
+        match i < self.camera.len() {
+            true => self.camera.triangle(i),
+            false => self.light.triangle(i - self.camera.len()),
+        }
     }
 
     fn len(&self) -> usize {
@@ -142,23 +149,24 @@ impl Clusters {
         cut: &Cut,
     ) -> bool {
         let n = all.len();
-        self.keys.clear();
-        self.keys.par_extend((0..n as u32).into_par_iter().map(|i| (grid.key(all.get(i)), i)));
+        *self = Self::default();
+        let mut keys: Vec<(u64, u32)> = Vec::with_capacity(n);
+        keys.par_extend((0..n as u32).into_par_iter().map(|i| (grid.key(&all.get(i)), i)));
         if cut.is_raised() {
             return false;
         }
         if only_seen {
-            unseen::sort_out(&mut self.keys, all);
+            unseen::sort_out(&mut keys, all);
         }
         // numbers make the order unique, so it does not depend on the threads
-        self.keys.par_sort_unstable();
-        let counting = self.keys.partition_point(|k| k.0 != UNSEEN);
-        let groups: Vec<&[(u64, u32)]> = self.keys[..counting].chunk_by(|a, b| a.0 == b.0).collect();
+        keys.par_sort_unstable();
+        let counting = keys.partition_point(|k| k.0 != UNSEEN);
+        let groups: Vec<&[(u64, u32)]> = keys[..counting].chunk_by(|a, b| a.0 == b.0).collect();
         let hidden: Vec<bool> = groups
             .par_iter()
             .with_min_len(GRAIN)
             .flat_map_iter(|group| {
-                let hub = Hub::new(grid, all.get(group[0].1));
+                let hub = Hub::new(grid, &all.get(group[0].1));
                 // the representative sees itself
                 let others = group[1..].iter().map(move |&(_, i)| {
                     let a = all.get(i);
@@ -171,10 +179,9 @@ impl Clusters {
             return false;
         }
         let mut layout = Layout { cameras: all.camera.len() as u32, ..Layout::default() };
-        (layout.order, layout.clusters) =
-            (std::mem::take(&mut self.order), std::mem::take(&mut self.clusters));
-        layout.order.clear();
-        layout.clusters.clear();
+        layout.order.reserve_exact(counting);
+        layout.clusters.reserve_exact(groups.len());
+        layout.pieces.reserve_exact(groups.len());
         let mut at = 0;
         for group in &groups {
             let hidden = &hidden[at..at + group.len()];
@@ -182,12 +189,15 @@ impl Clusters {
             layout.add(group, hidden, all.get(group[0].1).class);
         }
         let nobodys = layout.clusters.len() as u32;
-        layout.clusters.extend(self.keys.get(counting).map(|&(_, i)| Cluster::of_nobody(i)));
-        (self.order, self.clusters) = (layout.order, layout.clusters);
-        self.place.clear();
-        self.place.resize(n, u32::MAX);
-        self.of.clear();
-        self.of.resize(n, nobodys);
+        layout.clusters.extend((counting < n).then_some(Cluster::OF_NOBODY));
+        let scratch = keys.capacity() * size_of::<(u64, u32)>()
+            + groups.capacity() * size_of::<&[(u64, u32)]>()
+            + hidden.capacity();
+        drop(groups);
+        drop((keys, hidden));
+        (self.order, self.clusters, self.pieces) = (layout.order, layout.clusters, layout.pieces);
+        self.most_bytes = scratch + self.bytes();
+        (self.place, self.of) = (vec![u32::MAX; n], vec![nobodys; n]);
         for (c, cluster) in (0..).zip(&self.clusters) {
             for place in cluster.first..cluster.first + cluster.cameras + cluster.lights {
                 let i = self.order[place as usize] as usize;
@@ -200,21 +210,28 @@ impl Clusters {
     /// Finds the clusters' areas. Returns `false` if it was stopped.
     pub fn measure(&mut self, world: &World, grid: &Grid, all: Numbered, areas: Areas, cut: &Cut) -> bool {
         let order = &self.order;
-        let of_one = |c: &mut Cluster| {
+        let of_one = |(c, piece): (&mut Cluster, &Piece)| {
             if cut.is_raised() {
                 return 0;
             }
             let members = &order[c.first as usize..][..(c.cameras + c.lights) as usize];
-            measure(world, grid, all, members, c, areas)
+            measure(world, grid, all, members, (c, piece), areas)
         };
-        self.probes = self.clusters.par_iter_mut().with_min_len(GRAIN).map(of_one).sum();
+        let pieces = std::mem::take(&mut self.pieces);
+        let clusters = self.clusters.par_iter_mut().zip(&pieces);
+        self.probes = clusters.with_min_len(GRAIN).map(of_one).sum();
         !cut.is_raised()
+    }
+
+    /// The most that was held while arrivals were grouped, bytes.
+    pub fn most_bytes(&self) -> usize {
+        self.most_bytes.max(self.bytes())
     }
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         self.clusters.capacity() * size_of::<Cluster>()
-            + self.keys.capacity() * size_of::<(u64, u32)>()
+            + self.pieces.capacity() * size_of::<Piece>()
             + (self.order.capacity() + self.place.capacity() + self.of.capacity()) * size_of::<u32>()
     }
 }
@@ -244,6 +261,7 @@ struct Layout {
     cameras: u32,
     order: Vec<u32>,
     clusters: Vec<Cluster>,
+    pieces: Vec<Piece>,
 }
 
 impl Layout {
@@ -278,31 +296,33 @@ impl Layout {
                     area: 0.0,
                     inverse_area: 0.0,
                     class,
-                    representative,
-                    parted: parted.then_some(far),
-                    parts,
                 });
+                self.pieces.push(Piece { representative, parted: parted.then_some(far), parts });
             }
         }
     }
 }
 
 /// The areas of a cluster, each part of a voxel's having its share. Returns how many points were looked at.
-fn measure(world: &World, grid: &Grid, all: Numbered, members: &[u32], c: &mut Cluster, areas: Areas) -> u64 {
-    if members.is_empty() {
-        return 0;
-    }
-    let representative = all.get(c.representative);
+fn measure(
+    world: &World,
+    grid: &Grid,
+    all: Numbered,
+    members: &[u32],
+    (c, piece): (&mut Cluster, &Piece),
+    areas: Areas,
+) -> u64 {
+    let representative = all.get(piece.representative);
     let voxel = grid.voxel(representative.position);
-    let parts = c.parts as f32;
+    let parts = piece.parts as f32;
     let (_, edge) = grid.place(&voxel);
     c.area = edge * edge / parts;
     if areas == Areas::None {
         return 0;
     }
-    let cell = Cell { grid, voxel, representative, parted: c.parted };
-    let hub = Hub::new(grid, representative);
-    let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.get(i)));
+    let cell = Cell { grid, voxel, representative: &representative, parted: piece.parted };
+    let hub = Hub::new(grid, &representative);
+    let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.triangle(i)));
     let mut probes = 0;
     let mut estimate = |points: u32| {
         let is_hidden = |p, n| hub.is_hidden(world, p, n);

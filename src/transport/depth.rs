@@ -6,18 +6,17 @@
 //! with `m` of them reads what its end reflected `m` sweeps before.
 
 use super::Cut;
-use super::exchange::{emitted, gather, has_end, per_index, segments};
-use super::photons::{FromPhotons, gather_photons, photon_values, towards_camera};
+use super::exchange::{Segments, emitted, gather, has_end, per_index};
+use super::photons::{gather_photons, photon_values};
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
-use glam::Vec3;
-use rayon::prelude::*;
+use crate::math::SharedExponent;
 use std::collections::VecDeque;
 
 /// Reflected light of at most so many bounces, carried and of photons.
 struct Level {
-    carried: Vec<Vec3>,
-    photons: Vec<FromPhotons>,
+    carried: Vec<SharedExponent>,
+    photons: Vec<SharedExponent>,
 }
 
 /// The results of the last sweeps, as many as the longest chain reads back.
@@ -48,7 +47,7 @@ impl<T> Levels<T> {
 
 /// Most passages of a segment of the camera's paths; `first` as in [`Reflected::solve_limited`].
 pub(super) fn longest_chain(s: Sampled, first: &[(u32, u32)]) -> u32 {
-    s.camera.outgoing.iter().map(|o| o.passages).chain(first.iter().map(|f| f.1)).max().unwrap_or(0)
+    first.iter().map(|f| f.1).fold(s.camera.outgoing.most_passages(), u32::max)
 }
 
 impl Reflected {
@@ -63,11 +62,11 @@ impl Reflected {
         cut: &Cut,
     ) -> bool {
         let n = s.camera.arrivals.len();
-        let nothing = || vec![Vec3::ZERO; n];
-        let start = Level { carried: nothing(), photons: vec![FromPhotons::default(); n] };
+        let nothing = || vec![SharedExponent::default(); n];
+        let start = Level { carried: nothing(), photons: nothing() };
         let mut levels = Levels::new(start, longest_chain(s, first));
         self.direct = nothing();
-        self.segments = segments(s, w);
+        self.segments = Segments::new(s, w);
         let values = photon_values(s, w);
         for k in 1..=bounces {
             if cut.is_raised() {
@@ -76,20 +75,19 @@ impl Reflected {
             let brought = per_index(s, |i| {
                 // light met after k passages has bounced once more on its way
                 let met = emitted(s, w, i, Some(k - 1));
-                let level = levels.back(s.camera.outgoing[i].passages).filter(|_| has_end(s, i));
-                self.segments[i].value(met, level.map(|l| (l.carried[i + 1], l.photons[i + 1].brought)))
+                let level = levels.back(s.camera.outgoing.passages(i)).filter(|_| has_end(s, i));
+                let end = level.map(|l| (l.carried[i + 1].decode(), l.photons[i + 1].decode()));
+                SharedExponent::encode(self.segments.value(s, i, met, end))
             });
-            let photons = gather_photons(s, w, &self.segments, &values, cut, |bounces| bounces < k);
+            let photons = gather_photons(s, w, &values, cut, |bounces| bounces < k);
             let carried = gather(s, w, &brought, cut);
             if k == 1 {
                 self.direct.clone_from(&carried);
-                let seen =
-                    |(i, (d, p)): (usize, (&mut Vec3, &FromPhotons))| *d = towards_camera(s, i, *d, *p);
-                self.direct.par_iter_mut().zip(&photons).enumerate().for_each(seen);
+                self.add_direct_photons(s, &photons);
             }
             levels.push(Level { carried, photons });
         }
-        (self.carried, self.photons) = (nothing(), vec![FromPhotons::default(); n]);
+        (self.carried, self.photons) = (nothing(), nothing());
         for &(arrival, passages) in first {
             let i = arrival as usize;
             if let Some(level) = levels.back(passages) {

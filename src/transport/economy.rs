@@ -13,10 +13,11 @@
 
 use super::Cut;
 use super::cluster::Cluster;
-use super::exchange::{GRAIN, Segment, emitted_share, has_end};
+use super::exchange::{Densities, GRAIN, emitted_share, has_end};
 use super::guiding::{Outcome, worth_of_arrivals};
 use super::photons::photon_weight;
 use super::weigh::{Sampled, Weights, next_event_density};
+use crate::math::SharedExponent;
 use crate::shading::SurfaceClass;
 use crate::shading::bsdf::Bsdf;
 use glam::Vec3;
@@ -208,18 +209,18 @@ fn errors(o: Outcome, cut: &Cut) -> PerShare {
 }
 
 /// The variances of cluster number `k`. A single camera arrival does not tell how much it would vary.
-fn of_cluster(o: Outcome, k: usize, worth: &[Vec3]) -> PerShare {
+fn of_cluster(o: Outcome, k: usize, worth: &[SharedExponent]) -> PerShare {
     let s = o.sampled;
     let c = &s.clusters.clusters[k];
     let mut sum = [0.0; SHARES.len()];
-    if c.cameras < 2 || s.cameras(c).all(|i| worth[i] == Vec3::ZERO) {
+    if c.cameras < 2 || s.cameras(c).all(|i| worth[i].decode() == Vec3::ZERO) {
         return sum;
     }
     let draws: Vec<Draws> = s.cameras(c).map(|i| draws(o, i)).collect();
     let photons: Vec<Item> = s
         .lights(c)
         .map(|j| {
-            let photon = &s.light.photons[j];
+            let photon = s.light.photons.get(j);
             let counts = o.max_depth.is_none_or(|most| photon.bounces < most);
             let share = photon_weight(s, o.weights, j);
             let flux = if counts { photon.flux } else { Vec3::ZERO };
@@ -239,31 +240,30 @@ fn of_cluster(o: Outcome, k: usize, worth: &[Vec3]) -> PerShare {
     match c.class {
         SurfaceClass::Diffuse => {
             // all arrivals reflect alike: one row, and how much its square counts
-            let reflected = |i: usize| f64::from((worth[i] * s.camera.arrivals[i].reflectance).element_sum());
+            let reflected =
+                |i: usize| f64::from((worth[i].decode() * s.camera.arrivals.reflectance(i)).element_sum());
             let scale: f64 = s.cameras(c).map(|i| reflected(i).powi(2)).sum();
             let grey = Vec3::splat(1.0 / 3.0);
             let (camera, light): (Vec<usize>, Vec<usize>) = (s.cameras(c).collect(), s.lights(c).collect());
             let row = |column: usize| {
                 let i = camera[column];
-                [grey * s.camera.next_events[i].pdf, grey * s.camera.outgoing[i].pdf]
+                let next_event = s.camera.next_events.get(i).map_or(0.0, |n| n.pdf);
+                [grey * next_event, grey * s.camera.outgoing.pdf(i)]
             };
-            add(scale, &row, &|column| grey * s.light.arrivals[light[column]].back_pdf);
+            add(scale, &row, &|column| grey * s.light.arrivals.back_pdf(light[column]));
         }
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
             let camera: Vec<usize> = s.cameras(c).collect();
-            for (r, &i) in camera.iter().enumerate().filter(|&(_, &i)| worth[i] != Vec3::ZERO) {
-                let a = &s.camera.arrivals[i];
+            for (r, &i) in camera.iter().enumerate().filter(|&(_, &i)| worth[i].decode() != Vec3::ZERO) {
+                let (a, worth) = (s.camera.arrivals.get(i), worth[i].decode());
                 let bsdf: Bsdf = a.bsdf(s.world);
                 let f = o.weights.row(k, r);
                 let row = |column: usize| {
-                    let next_event = &s.camera.next_events[camera[column]];
-                    let lit = match next_event.next_event_pdf > 0.0 {
-                        true => bsdf.eval(a.wo, next_event.direction),
-                        false => Vec3::ZERO,
-                    };
-                    [worth[i] * lit, worth[i] * f[column]]
+                    let next_event = s.camera.next_events.get(camera[column]);
+                    let lit = next_event.map_or(Vec3::ZERO, |n| bsdf.eval(a.wo, n.direction));
+                    [worth * lit, worth * f[column].decode()]
                 };
-                add(1.0, &row, &|column| worth[i] * f[camera.len() + column]);
+                add(1.0, &row, &|column| worth * f[camera.len() + column].decode());
             }
         }
     }
@@ -279,25 +279,25 @@ fn value(item: &Item, lobe: Vec3) -> (f64, f64) {
 fn draws(o: Outcome, i: usize) -> Draws {
     let (s, w): (Sampled, &Weights) = (o.sampled, o.weights);
     let c = s.cluster_of(i);
-    let next_event = &s.camera.next_events[i];
-    let segment: &Segment = &o.reflected.segments[i];
+    let segments = &o.reflected.segments;
     let mut draws = Draws::default();
-    if next_event.next_event_pdf > 0.0 {
+    if let Some(next_event) = s.camera.next_events.get(i) {
         // the densities of the cluster's lobes along it are those of its own, as far as they are alike
-        let p_cam = c.cameras as f32 * s.camera.arrivals[i].survival * next_event.pdf;
-        let density = next_event_density(next_event, p_cam, c);
+        let p_cam = c.cameras as f32 * s.camera.arrivals.survival(i) * next_event.pdf;
+        let density = next_event_density(&next_event, p_cam, c);
         let light = next_event.light / (density * c.area);
         draws.next_event = Item { light, share: next_event.light_density / density };
     }
-    if !s.camera.arrivals[i].goes_on {
+    if !s.camera.arrivals.goes_on(i) {
         return draws;
     }
-    draws.emitted = Item { light: segment.emitted / c.area, share: emitted_share(s, w, i) };
+    draws.emitted = Item { light: segments.emitted(i) / c.area, share: emitted_share(s, w, i) };
     if has_end(s, i) {
         let p_light = w.densities[s.clusters.place[i + 1] as usize].light.max(0.0);
-        let light = segment.value(Vec3::ZERO, Some(o.reflected.end_of(i))) / c.area;
-        let by_light = segment.light * p_light;
-        let density = segment.density(p_light, 0.0);
+        let light = segments.value(s, i, Vec3::ZERO, Some(o.reflected.end_of(i))) / c.area;
+        let densities = Densities::of(s, w, i);
+        let by_light = densities.light * p_light;
+        let density = densities.all(p_light, 0.0);
         let share = if density > 0.0 { by_light / density } else { 0.0 };
         draws.carried = Item { light, share };
     }

@@ -4,8 +4,10 @@ use super::Cut;
 use super::bridge::Bridges;
 use super::cluster::Cluster;
 use super::returns::Gathered;
+use super::sparse::Sparse;
 use super::store::EmissionHit;
-use super::weigh::{Density, Sampled, Weights};
+use super::weigh::{Sampled, Weights};
+use crate::math::SharedExponent;
 use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -13,52 +15,132 @@ use rayon::prelude::*;
 /// Fewest arrivals or clusters, and number of paths, that one task takes.
 pub(super) const GRAIN: usize = 512;
 
-/// The constants of a camera segment, by the arrival it leaves.
+/// The densities with which the techniques make a camera segment that ends at an arrival.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Segment {
-    /// Emitted light that it met, weighed: `E / D_E`.
-    pub emitted: Vec3,
-    /// Factor on what its end reflects: `T / D_R`.
-    pub carry: Vec3,
-    /// Density of the camera's techniques: `c P_cam / A_x`.
+pub(super) struct Densities {
+    /// That of the camera's: `c P_cam / A_x`.
     pub camera: f32,
     /// Factor on `P_light` that makes it the density of the light's techniques: `c / (A_y n_rel^2)`.
     pub light: f32,
     /// Density of bridges along it, were its end's cluster chosen with certainty.
     pub bridge: f32,
-    /// Own-path continuation: `P_cam / (q p)`.
-    pub continuation: f32,
 }
 
-impl Segment {
+impl Densities {
+    /// Of the segment that leaves arrival `i`, which has an end.
+    pub fn of(s: Sampled, w: &Weights, i: usize) -> Self {
+        let (here, end) = (s.cluster_of(i), s.cluster_of(i + 1));
+        let out = s.camera.outgoing.get(i);
+        let bridge = match s.bridges.filter(|_| out.passages == 0) {
+            Some(_) => {
+                let [a, b] = [i, i + 1].map(|i| s.camera.arrivals.get(i));
+                Bridges::density(s, &a, here, &b, end)
+            }
+            None => 0.0,
+        };
+        let p_camera = w.densities[s.clusters.place[i] as usize].camera;
+        Self {
+            camera: out.forward * p_camera / here.area,
+            light: out.reverse * out.squeeze / end.area,
+            bridge,
+        }
+    }
+
+    /// Density of all techniques: `p_light` and `chance` of its end's cluster.
+    pub fn all(&self, p_light: f32, chance: f32) -> f32 {
+        self.camera + self.light * p_light.max(0.0) + self.bridge * chance
+    }
+}
+
+/// What does not change from sweep to sweep, of the segments that leave arrivals.
+#[derive(Debug, Default)]
+pub(super) struct Segments {
+    /// Emitted light that they met, weighed: `E / D_E`.
+    emitted: Sparse<SharedExponent>,
+    /// One over the density of all techniques, of those that have an end: `1 / D_R`.
+    reciprocals: Vec<f32>,
+}
+
+impl Segments {
+    /// Of all camera segments.
+    pub fn new(s: Sampled, w: &Weights) -> Self {
+        let n = s.camera.arrivals.len();
+        let some = |first: usize| {
+            let mut part = Self::default();
+            for i in first..(first + GRAIN).min(n) {
+                let light = match s.camera.hits.has(i) {
+                    true => emitted(s, w, i, None),
+                    false => Vec3::ZERO,
+                };
+                part.emitted.push((light != Vec3::ZERO).then(|| SharedExponent::encode(light)));
+                part.reciprocals.push(if has_end(s, i) { Self::reciprocal(s, w, i) } else { 0.0 });
+            }
+            part
+        };
+        let parts: Vec<Self> = (0..n.div_ceil(GRAIN)).into_par_iter().map(|k| some(k * GRAIN)).collect();
+        let mut all = Self::default();
+        all.emitted.reserve(n, parts.iter().map(|p| p.emitted.count()).sum());
+        all.reciprocals.reserve_exact(n);
+        for mut part in parts {
+            all.emitted.append(&mut part.emitted);
+            all.reciprocals.append(&mut part.reciprocals);
+        }
+        all
+    }
+
+    fn reciprocal(s: Sampled, w: &Weights, i: usize) -> f32 {
+        let p_light = w.densities[s.clusters.place[i + 1] as usize].light;
+        let chance = s.bridges.map_or(0.0, |b| b.chances[s.clusters.of[i + 1] as usize]);
+        reciprocal(Densities::of(s, w, i).all(p_light, chance))
+    }
+
+    /// Emitted light that the segment which leaves arrival `i` met, weighed.
+    #[inline]
+    pub fn emitted(&self, i: usize) -> Vec3 {
+        self.emitted.get(i).map_or(Vec3::ZERO, |e| e.decode())
+    }
+
+    /// Factor on what the end of that segment reflects, `T / D_R`; zero without an end.
+    #[inline]
+    pub fn carry(&self, s: Sampled, i: usize) -> Vec3 {
+        match self.reciprocals[i] {
+            0.0 => Vec3::ZERO,
+            reciprocal => s.camera.outgoing.throughput(i) * reciprocal,
+        }
+    }
+
     /// What it brings, `value(s')`, if it met so much light, and if its end, where it has one, reflects so much
     /// carried light and has photons that bring so much.
     #[inline]
-    pub fn value(&self, emitted: Vec3, end: Option<(Vec3, Vec3)>) -> Vec3 {
+    pub fn value(&self, s: Sampled, i: usize, emitted: Vec3, end: Option<(Vec3, Vec3)>) -> Vec3 {
         match end {
-            Some((carried, brought)) => emitted + self.carry * carried + brought,
+            Some((carried, brought)) => emitted + self.carry(s, i) * carried + brought,
             None => emitted,
         }
     }
 
-    /// Factor on what it brings that makes it the own path's estimate of what arrival `i`, which it leaves, reflects.
-    pub fn along_path(&self, s: Sampled, w: &Weights, i: usize) -> Vec3 {
-        let cluster = s.clusters.of[i] as usize;
-        let c = &s.clusters.clusters[cluster];
-        let f = match c.class {
-            SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * s.camera.outgoing[i].pdf,
-            SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let row = (s.clusters.place[i] - c.first) as usize;
-                w.row(cluster, row)[row]
-            }
-        };
-        f * (self.continuation / c.area)
+    /// Memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.emitted.bytes() + self.reciprocals.capacity() * size_of::<f32>()
     }
+}
 
-    /// Densities of all techniques: `p_light` and `chance` of its end's cluster.
-    pub fn density(&self, p_light: f32, chance: f32) -> f32 {
-        self.camera + self.light * p_light.max(0.0) + self.bridge * chance
-    }
+/// Factor on what a segment brings that makes it the own path's estimate of what arrival `i`, which it leaves, reflects.
+pub(super) fn along_path(s: Sampled, w: &Weights, i: usize) -> Vec3 {
+    let (cluster, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
+    let c = &s.clusters.clusters[cluster];
+    let pdf = s.camera.outgoing.pdf(i);
+    let (f, within) = match c.class {
+        SurfaceClass::Diffuse => (s.camera.arrivals.reflectance(i) * pdf, 1.0),
+        // paired values have it within
+        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+            let row = (place - c.first) as usize;
+            (w.row(cluster, row)[row].decode(), w.apart(place))
+        }
+    };
+    let continuation =
+        w.densities[place as usize].camera * reciprocal(s.camera.arrivals.survival(i) * pdf * within);
+    f * (continuation / c.area)
 }
 
 /// One over a density; zero where there is none, or so little that nothing can have come of it.
@@ -70,17 +152,14 @@ pub(super) fn reciprocal(density: f32) -> f32 {
 /// Whether a segment that leaves arrival `i` ends at the next one.
 #[inline]
 pub(super) fn has_end(s: Sampled, i: usize) -> bool {
-    s.camera.outgoing[i].forward > 0.0
+    s.camera.outgoing.has_end(i)
 }
 
 /// Lights that the segment which leaves arrival `i` met, each with one over the density of all techniques, `1 / D_E`.
-fn met<'a>(s: Sampled<'a>, w: &Weights, i: usize) -> impl Iterator<Item = (&'a EmissionHit, f32)> {
-    let hits = &s.camera.hits;
+fn met<'a>(s: Sampled<'a>, w: &Weights, i: usize) -> impl Iterator<Item = (EmissionHit, f32)> + use<'a> {
     let here = s.cluster_of(i);
     let camera = w.densities[s.clusters.place[i] as usize].camera / here.area;
-    let first = hits.partition_point(|h| (h.arrival as usize) < i);
-    let own = hits[first..].iter().take_while(move |h| h.arrival as usize == i);
-    own.map(move |h| {
+    s.camera.hits.of(i).map(move |h| {
         let next_event = h.next_event_pdf * here.cameras as f32 / here.area;
         (h, reciprocal(h.forward * camera + next_event + h.light_density))
     })
@@ -104,50 +183,21 @@ pub(super) fn emitted_share(s: Sampled, w: &Weights, i: usize) -> f32 {
     if all > 0.0 { by_light / all } else { 0.0 }
 }
 
-/// The constants of all camera segments.
-pub(super) fn segments(s: Sampled, w: &Weights) -> Vec<Segment> {
-    let one = |i: usize| {
-        let (a, out) = (&s.camera.arrivals[i], &s.camera.outgoing[i]);
-        if !a.goes_on {
-            return Segment::default();
-        }
-        let here = s.cluster_of(i);
-        let Density { camera: p_camera, apart, .. } = w.densities[s.clusters.place[i] as usize];
-        // paired values have it within
-        let within = if here.class == SurfaceClass::Diffuse { 1.0 } else { apart };
-        let constants = Segment {
-            emitted: emitted(s, w, i, None),
-            continuation: p_camera * reciprocal(a.survival * out.pdf * within),
-            ..Segment::default()
-        };
-        if !has_end(s, i) {
-            return constants;
-        }
-        let end = s.cluster_of(i + 1);
-        let p_light = w.densities[s.clusters.place[i + 1] as usize].light;
-        let camera = out.forward * p_camera / here.area;
-        let light = out.reverse * out.squeeze / end.area;
-        let (mut bridge, mut chance) = (0.0, 0.0);
-        if let Some(bridges) = s.bridges.filter(|_| out.passages == 0) {
-            bridge = Bridges::density(s, a, here, &s.camera.arrivals[i + 1], end);
-            chance = bridges.chances[s.clusters.of[i + 1] as usize];
-        }
-        let constants = Segment { camera, light, bridge, ..constants };
-        Segment { carry: out.throughput * reciprocal(constants.density(p_light, chance)), ..constants }
-    };
-    per_index(s, one)
+/// Next-event light, and the values of the segments that leave a cluster, reflected at its arrivals.
+pub(super) fn gather(s: Sampled, w: &Weights, values: &[SharedExponent], cut: &Cut) -> Vec<SharedExponent> {
+    let all = |i: usize, light: Vec3| SharedExponent::encode(light + w.direct(s.clusters.place[i]));
+    reflect(s, w, |i| values[i].decode(), all, cut)
 }
 
-/// Next-event light, and the `values` of the segments that leave a cluster, reflected at its arrivals.
-pub(super) fn gather(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec<Vec3> {
-    let mut light = reflect(s, w, values, cut);
-    light.par_iter_mut().zip(&s.clusters.place).for_each(|(l, &place)| *l += w.direct[place as usize]);
-    light
-}
-
-/// What arrivals reflect of the `values` of the segments that leave their clusters.
-pub(super) fn reflect(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Vec<Vec3> {
-    let arriving = |i: usize| (values[i] * s.camera.outgoing[i].pdf).as_dvec3();
+/// What arrivals reflect of the values of the segments that leave their clusters; `keep` makes of it what is stored.
+pub(super) fn reflect<T: Default + Send>(
+    s: Sampled,
+    w: &Weights,
+    value: impl Fn(usize) -> Vec3 + Sync,
+    keep: impl Fn(usize, Vec3) -> T + Sync,
+    cut: &Cut,
+) -> Vec<T> {
+    let arriving = |i: usize| (value(i) * s.camera.outgoing.pdf(i)).as_dvec3();
     let shared =
         per_diffuse_cluster(s, cut, |c| s.cameras(c).map(arriving).sum::<DVec3>().as_vec3() / c.area);
     let of_others = |i: usize, c: &Cluster, apart: f32| {
@@ -155,17 +205,20 @@ pub(super) fn reflect(s: Sampled, w: &Weights, values: &[Vec3], cut: &Cut) -> Ve
         let gathered = Gathered::new(s, c, row);
         gathered.arrivals(s, c).map(arriving).sum::<DVec3>().as_vec3() * (apart / c.area)
     };
-    per_arrival(s, cut, |i, k, c| match c.class {
-        SurfaceClass::Diffuse => {
-            let apart = w.densities[s.clusters.place[i] as usize].apart;
-            let arriving = if apart == 1.0 { shared[k] } else { of_others(i, c, apart) };
-            s.camera.arrivals[i].reflectance * arriving
-        }
-        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-            let f = w.row(k, (s.clusters.place[i] - c.first) as usize);
-            let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| *f * values[i]).sum();
-            sum / c.area
-        }
+    per_arrival(s, cut, |i, k, c| {
+        let light = match c.class {
+            SurfaceClass::Diffuse => {
+                let apart = w.apart(s.clusters.place[i]);
+                let arriving = if apart == 1.0 { shared[k] } else { of_others(i, c, apart) };
+                s.camera.arrivals.reflectance(i) * arriving
+            }
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+                let f = w.row(k, (s.clusters.place[i] - c.first) as usize);
+                let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * value(i)).sum();
+                sum / c.area
+            }
+        };
+        keep(i, light)
     })
 }
 

@@ -6,11 +6,12 @@
 //! on nothing of its own: that biases nothing.
 
 use super::cluster::Cluster;
-use super::exchange::{GRAIN, has_end, per_diffuse_cluster};
+use super::exchange::{GRAIN, along_path, has_end, per_diffuse_cluster};
 use super::photons::photon_values;
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use super::{Cut, store::LightStore};
+use crate::math::SharedExponent;
 use crate::shading::emitters::{EmissionGuide, Lesson};
 use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
@@ -72,8 +73,9 @@ impl Guiding {
     pub fn learn(&mut self, o: Outcome, cut: &Cut) -> usize {
         let worth = worth_of_paths(o, cut);
         let stride = worth.len().div_ceil(MOST).max(1);
-        let bytes = o.reflected.carried.len() * size_of::<Vec3>()
-            + o.sampled.light.photons.len() * size_of::<Vec3>()
+        let colors = o.reflected.carried.len() + o.sampled.light.photons.len();
+        let bytes = colors * size_of::<SharedExponent>()
+            + o.sampled.clusters.clusters.len() * size_of::<Vec3>()
             + worth.len() * size_of::<f32>();
         let chosen = o.sampled.light.starts.iter().zip(worth).step_by(stride);
         self.lessons.extend(chosen.map(|(start, worth)| Lesson { draw: start.draw, worth }));
@@ -98,26 +100,30 @@ fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
     let Outcome { sampled: s, weights: w, .. } = o;
     let arrivals = worth_of_arrivals(o, |_| 1.0);
     let shared = per_diffuse_cluster(s, cut, |c| {
-        let reflecting = s.cameras(c).map(|i| (arrivals[i] * s.camera.arrivals[i].reflectance).as_dvec3());
+        let reflecting =
+            s.cameras(c).map(|i| (arrivals[i].decode() * s.camera.arrivals.reflectance(i)).as_dvec3());
         reflecting.sum::<DVec3>().as_vec3()
     });
     let values = photon_values(s, w);
     let cameras = s.camera.arrivals.len();
     let of_photon = |j: usize| {
-        if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons[j].bounces >= most) {
+        if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons.bounces(j) >= most) {
             return 0.0;
         }
         let place = s.clusters.place[cameras + j];
         let k = s.clusters.of[cameras + j] as usize;
         let c = &s.clusters.clusters[k];
         let reflected = match c.class {
-            SurfaceClass::Diffuse => shared[k] * s.light.arrivals[j].back_pdf,
+            SurfaceClass::Diffuse => shared[k] * s.light.arrivals.back_pdf(j),
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let column = (place - c.first) as usize;
-                s.cameras(c).enumerate().map(|(row, i)| w.row(k, row)[column] * arrivals[i]).sum()
+                s.cameras(c)
+                    .enumerate()
+                    .map(|(row, i)| w.row(k, row)[column].decode() * arrivals[i].decode())
+                    .sum()
             }
         };
-        reflected.dot(values[j])
+        reflected.dot(values[j].decode())
     };
     let LightStore { photons, starts, .. } = s.light;
     let ends = starts.iter().skip(1).map(|s| s.first).chain([photons.len() as u32]);
@@ -128,26 +134,26 @@ fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
 
 /// What one unit of light that each camera arrival reflects of its photons adds to the picture. `spread`: a factor for
 /// every bounce, by the cluster that is left.
-pub(super) fn worth_of_arrivals(o: Outcome, spread: impl Fn(&Cluster) -> f32 + Sync) -> Vec<Vec3> {
+pub(super) fn worth_of_arrivals(o: Outcome, spread: impl Fn(&Cluster) -> f32 + Sync) -> Vec<SharedExponent> {
     let Outcome { sampled: s, weights: w, starts, .. } = o;
     let constants = &o.reflected.segments;
     let n = s.camera.arrivals.len();
     let some_paths = |(k, paths): (usize, &[Start])| {
         let first = paths[0].arrival as usize;
         let end = starts.get((k + 1) * GRAIN).map_or(n, |e| e.arrival as usize);
-        let mut worth = vec![Vec3::ZERO; end - first];
+        let mut worth = vec![SharedExponent::default(); end - first];
         for (p, next) in paths.iter().zip(paths.iter().skip(1).map(Some).chain([None])) {
             let (mut along, mut bounces) = (p.worth, p.passages);
             for i in p.arrival as usize..next.map_or(end, |p| p.arrival as usize) {
                 if o.max_depth.is_some_and(|most| bounces >= most) {
                     break;
                 }
-                worth[i - first] = along * s.camera.inverse_n2[i];
+                worth[i - first] = SharedExponent::encode(along * s.camera.inverse_n2(i));
                 if !has_end(s, i) {
                     break;
                 }
-                along *= constants[i].along_path(s, w, i) * constants[i].carry * spread(s.cluster_of(i));
-                bounces = bounces.saturating_add(1 + s.camera.outgoing[i].passages);
+                along *= along_path(s, w, i) * constants.carry(s, i) * spread(s.cluster_of(i));
+                bounces = bounces.saturating_add(1 + s.camera.outgoing.passages(i));
             }
         }
         worth

@@ -7,12 +7,12 @@
 
 use super::Cut;
 use super::depth::{Levels, longest_chain};
-use super::exchange::{GRAIN, Segment, emitted, has_end, per_diffuse_cluster, reciprocal, segments};
-use super::photons::{FromPhotons, photon_value};
+use super::exchange::{GRAIN, Segments, emitted, has_end, per_diffuse_cluster, reciprocal};
+use super::photons::photon_value;
 use super::propagate::Reflected;
 use super::store::Rivals;
 use super::weigh::{Sampled, Weights};
-use crate::math::luminance;
+use crate::math::{SharedExponent, luminance};
 use crate::shading::SurfaceClass;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ impl Reflected {
         bounces: Option<u32>,
         cut: &Cut,
     ) -> bool {
-        self.segments = segments(s, w);
+        self.segments = Segments::new(s, w);
         let recursion = Recursion { s, w, segments: &self.segments, photons: photon_segments(s, w) };
         // without a limit a chain counts no more than a straight segment
         let sweeps_of = |passages: u32| if bounces.is_some() { passages } else { 0 };
@@ -42,7 +42,8 @@ impl Reflected {
         let start = vec![Vec3::ZERO; s.clusters.of.len()];
         let mut levels = Levels::new(start, sweeps_of(chains.max(longest_chain(s, first))));
         let n = s.camera.arrivals.len();
-        self.direct = vec![Vec3::ZERO; n];
+        let nothing = || vec![SharedExponent::default(); n];
+        self.direct = nothing();
         let mut before = 0.0;
         for k in 1..=bounces.unwrap_or(SWEEPS[1]) {
             if cut.is_raised() {
@@ -53,7 +54,7 @@ impl Reflected {
                 |i: usize, passages: u32| levels.back(sweeps_of(passages)).map_or(Vec3::ZERO, |l| l[i]);
             let next = recursion.sweep(read, most, cut);
             if k == 1 {
-                self.direct.copy_from_slice(&next[..n]);
+                self.direct = next[..n].iter().map(|l| SharedExponent::encode(*l)).collect();
             }
             let now = first.iter().map(|&(i, _)| f64::from(luminance(next[i as usize]))).sum::<f64>();
             levels.push(next);
@@ -63,10 +64,10 @@ impl Reflected {
                 break;
             }
         }
-        (self.carried, self.photons) = (vec![Vec3::ZERO; n], vec![FromPhotons::default(); n]);
+        (self.carried, self.photons) = (nothing(), nothing());
         for &(arrival, passages) in first {
             if let Some(level) = levels.back(sweeps_of(passages)) {
-                self.carried[arrival as usize] = level[arrival as usize];
+                self.carried[arrival as usize] = SharedExponent::encode(level[arrival as usize]);
             }
         }
         true
@@ -88,7 +89,7 @@ struct LightSegment {
 fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
     let n = s.camera.arrivals.len();
     let one = |j: usize| {
-        let (photon, carry) = (&s.light.photons[j], &s.light.carries[j]);
+        let (photon, carry) = (s.light.photons.get(j), &s.light.carries[j]);
         let Rivals::Later { light_choices, squeeze } = photon.rivals else {
             return LightSegment {
                 emitted: photon_value(s, w, j) * (s.cluster_of(n + j).area * carry.inverse_n2),
@@ -103,7 +104,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
         LightSegment {
             emitted: Vec3::ZERO,
             carry: carry.throughput * reciprocal(light + p_camera / s.cluster_of(n + j).area),
-            passages: photon.bounces - s.light.photons[before].bounces - 1,
+            passages: photon.bounces.saturating_sub(s.light.photons.bounces(before) + 1),
         }
     };
     (0..s.light.photons.len()).into_par_iter().with_min_len(GRAIN).map(one).collect()
@@ -113,7 +114,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
 struct Recursion<'a> {
     s: Sampled<'a>,
     w: &'a Weights,
-    segments: &'a [Segment],
+    segments: &'a Segments,
     photons: Vec<LightSegment>,
 }
 
@@ -125,8 +126,8 @@ impl Recursion<'_> {
         let Self { s, w, segments, photons } = self;
         let n = s.camera.arrivals.len();
         let leaving = |i: usize| {
-            let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing[i].passages), Vec3::ZERO));
-            segments[i].value(emitted(*s, w, i, most), end)
+            let end = has_end(*s, i).then(|| (read(i + 1, s.camera.outgoing.passages(i)), Vec3::ZERO));
+            segments.value(*s, i, emitted(*s, w, i, most), end)
         };
         let brought = |j: usize| {
             let p = &photons[j];
@@ -138,12 +139,12 @@ impl Recursion<'_> {
         let numbers = || (0..s.clusters.of.len()).into_par_iter().with_min_len(GRAIN);
         let values: Vec<Vec3> = numbers().map(|i| if i < n { leaving(i) } else { brought(i - n) }).collect();
         let shared = per_diffuse_cluster(*s, cut, |c| {
-            let cameras = s.cameras(c).map(|i| (values[i] * s.camera.outgoing[i].pdf).as_dvec3());
-            let lights = s.lights(c).map(|j| (values[n + j] * s.light.arrivals[j].back_pdf).as_dvec3());
+            let cameras = s.cameras(c).map(|i| (values[i] * s.camera.outgoing.pdf(i)).as_dvec3());
+            let lights = s.lights(c).map(|j| (values[n + j] * s.light.arrivals.back_pdf(j)).as_dvec3());
             (cameras.sum::<DVec3>() + lights.sum::<DVec3>()).as_vec3() / c.area
         });
         let reflected = |i: usize| {
-            if cut.is_raised() || (i >= n && s.light.photons[i - n].pdf <= 0.0) {
+            if cut.is_raised() || (i >= n && s.light.photons.pdf(i - n) <= 0.0) {
                 return Vec3::ZERO;
             }
             let (k, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
@@ -153,32 +154,34 @@ impl Recursion<'_> {
                 SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                     let (to_camera, to_light) =
                         w.row(k, (place - c.first) as usize).split_at(c.cameras as usize);
-                    let cameras: Vec3 = to_camera.iter().zip(s.cameras(c)).map(|(f, i)| *f * values[i]).sum();
+                    let cameras: Vec3 =
+                        to_camera.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * values[i]).sum();
                     // the row holds f (n_o / n_i)^2, and radiance is basic
                     let lights = to_light.iter().zip(s.lights(c)).map(|(f, j)| {
-                        *f * values[n + j] * (self.inverse_n2(i) / s.light.carries[j].inverse_n2)
+                        f.decode() * values[n + j] * (self.inverse_n2(i) / s.light.carries[j].inverse_n2)
                     });
                     (cameras + lights.sum::<Vec3>()) / c.area
                 }
             };
-            w.direct[place as usize] + gathered
+            w.direct(place) + gathered
         };
         numbers().map(reflected).collect()
     }
 
     fn reflectance(&self, i: usize) -> Vec3 {
         let n = self.s.camera.arrivals.len();
-        if i < n { self.s.camera.arrivals[i].reflectance } else { self.s.light.arrivals[i - n].reflectance }
+        if i < n { self.s.camera.arrivals.reflectance(i) } else { self.s.light.arrivals.reflectance(i - n) }
     }
 
     /// `1 / n^2` on the side to which arrival `i` reflects.
     fn inverse_n2(&self, i: usize) -> f32 {
         let n = self.s.camera.arrivals.len();
         if i < n {
-            return self.s.camera.inverse_n2[i];
+            return self.s.camera.inverse_n2(i);
         }
         // where the path goes on, seen from its next arrival
-        match self.s.light.photons.get(i - n + 1).map(|next| &next.rivals) {
+        let next = (i - n + 1 < self.s.light.photons.len()).then(|| self.s.light.photons.get(i - n + 1));
+        match next.map(|next| next.rivals) {
             Some(Rivals::Later { squeeze, .. }) => self.s.light.carries[i - n + 1].inverse_n2 * squeeze,
             _ => self.s.light.carries[i - n].inverse_n2,
         }

@@ -18,11 +18,13 @@ pub mod light;
 mod literal;
 pub mod operator;
 mod own_path;
+mod paired;
 mod photons;
 pub mod propagate;
 pub mod report;
 mod returns;
 pub mod sizes;
+pub mod sparse;
 pub mod store;
 #[cfg(test)]
 pub(crate) mod testing;

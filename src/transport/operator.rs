@@ -5,6 +5,7 @@ use super::Cut;
 use super::exchange::{has_end, per_index, reflect};
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
+use crate::math::SharedExponent;
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -32,23 +33,23 @@ impl Reflected {
     pub fn sweeps(&self, s: Sampled, w: &Weights, starts: &[u32], count: u32, cut: &Cut) -> Sweeps {
         let [radius, peak] = self.growth(s, w, count, cut);
         let tails = || self.own_tails(s, w, starts, cut);
-        let solution = (0..count).fold(tails(), |light, _| self.sweep(s, w, &light, cut));
+        let solution = (0..count).fold(tails(), |light, _| self.sweep(s, w, light, cut));
         let sum = |f: &dyn Fn(usize) -> Vec3| {
             starts.iter().map(|&i| f64::from(f(i as usize).abs().element_sum())).sum::<f64>()
         };
-        let all = sum(&|i| solution[i] + self.photons[i].reflected).max(f64::MIN_POSITIVE);
-        let distances = |mut light: Vec<Vec3>| {
+        let all = sum(&|i| solution[i].decode() + self.photons[i].decode()).max(f64::MIN_POSITIVE);
+        let distances = |mut light: Vec<SharedExponent>| {
             let mut found = Vec::new();
             // not up to the end, where the solution's own error would show
             for sweep in 1..=count / 4 {
-                light = self.sweep(s, w, &light, cut);
+                light = self.sweep(s, w, light, cut);
                 if sweep.is_power_of_two() {
-                    found.push(sum(&|i| light[i] - solution[i]) / all);
+                    found.push(sum(&|i| light[i].decode() - solution[i].decode()) / all);
                 }
             }
             found
         };
-        let darkness = vec![Vec3::ZERO; solution.len()];
+        let darkness = vec![SharedExponent::default(); solution.len()];
         Sweeps { count, radius, peak, from_darkness: distances(darkness), from_tails: distances(tails()) }
     }
 
@@ -61,10 +62,10 @@ impl Reflected {
         let (mut now, mut half, mut peak) = (0.0_f64, 0.0, f64::NEG_INFINITY);
         for sweep in 1..=count {
             let brought = per_index(s, |i| match has_end(s, i) {
-                true => self.segments[i].carry * light[i + 1],
+                true => self.segments.carry(s, i) * light[i + 1],
                 false => Vec3::ZERO,
             });
-            light = reflect(s, w, &brought, cut);
+            light = reflect(s, w, |i| brought[i], |_, light| light, cut);
             let left = norm(&light) / first;
             // what is left is not told from nothing
             if left < f64::from(f32::MIN_POSITIVE) || cut.is_raised() {

@@ -9,7 +9,7 @@ use super::propagate::Reflected;
 use super::store::{EmissionHit, NextEvent, Rivals};
 use super::walk::Chain;
 use super::weigh::{Sampled, Weights};
-use crate::math::luminance;
+use crate::math::{SharedExponent, luminance};
 use glam::Vec3;
 
 /// Weight above which photons find what a camera path meets so rarely that its mean says nothing.
@@ -68,25 +68,26 @@ impl OwnPath {
 }
 
 impl Reflected {
-    /// How much of the light these arrivals reflect is beyond their own paths, squared as a share and summed: photons bring it
+    /// How much of the light these first arrivals reflect is beyond their own paths, squared as a share and summed: photons bring it
     /// straight from lights through Dirac lobes, and camera segments hardly ever meet those lights.
-    pub fn beyond_own_paths(&self, s: Sampled, w: &Weights, arrivals: &[u32], cut: &Cut) -> f64 {
+    pub fn beyond_own_paths(&self, s: Sampled, w: &Weights, firsts: &[u32], cut: &Cut) -> f64 {
         let mut values = photon_values(s, w);
         for (j, value) in values.iter_mut().enumerate() {
-            let is_straight = match s.light.photons[j].rivals {
+            let is_straight = match s.light.photons.get(j).rivals {
                 Rivals::First { next_event_pdf, .. } => next_event_pdf == 0.0,
                 Rivals::Later { .. } => false,
             };
-            if *value != Vec3::ZERO && !(is_straight && photon_weight(s, w, j) > HARDLY_MET) {
-                *value = Vec3::ZERO;
+            let is_black = *value == SharedExponent::default();
+            if !(is_black || is_straight && photon_weight(s, w, j) > HARDLY_MET) {
+                *value = SharedExponent::default();
             }
         }
-        let beyond = gather_photons(s, w, &self.segments, &values, cut, |_| true);
+        let beyond = gather_photons(s, w, &values, cut, |_| true);
         let square = |&i: &u32| {
             let i = i as usize;
-            let share = luminance(beyond[i].reflected) / luminance(self.towards_camera(s, i));
+            let share = luminance(beyond[i].decode()) / luminance(self.towards_camera(s, i));
             if share.is_finite() { f64::from(share.clamp(0.0, 1.0)).powi(2) } else { 0.0 }
         };
-        arrivals.iter().map(square).sum()
+        firsts.iter().map(square).sum()
     }
 }

@@ -2,7 +2,7 @@
 //! operator feeds back. Its spectral radius is at most its largest row sum.
 
 use super::Cut;
-use super::exchange::{Segment, per_index, reflect};
+use super::exchange::{Segments, reflect};
 use super::operator::Sweeps;
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
@@ -57,11 +57,10 @@ fn sizes(s: Sampled) -> (Vec<u64>, u32) {
     (sizes, largest)
 }
 
-fn row_sums(s: Sampled, w: &Weights, constants: &[Segment], cut: &Cut) -> RowSums {
-    let carries = per_index(s, |i| constants[i].carry);
-    let sums = reflect(s, w, &carries, cut);
+fn row_sums(s: Sampled, w: &Weights, constants: &Segments, cut: &Cut) -> RowSums {
+    let sums = reflect(s, w, |i| constants.carry(s, i), |_, sum| sum.max_element(), cut);
     let mut found = RowSums { least: f32::INFINITY, ..RowSums::default() };
-    for sum in sums.iter().map(|v| v.max_element()) {
+    for &sum in &sums {
         found.least = found.least.min(sum);
         found.largest = found.largest.max(sum);
         found.mean += f64::from(sum) / sums.len() as f64;

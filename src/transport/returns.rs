@@ -17,7 +17,7 @@ const MOST: u32 = 64;
 impl CameraStore {
     /// Whether two arrivals, the earlier one first, are of the same path.
     fn are_one_path(&self, earlier: u32, later: u32) -> bool {
-        (earlier..later).all(|i| self.outgoing[i as usize].forward > 0.0)
+        (earlier..later).all(|i| self.outgoing.has_end(i as usize))
     }
 }
 
@@ -59,14 +59,16 @@ impl Gathered {
 }
 
 /// Leaves returning paths out of the lobe values of a cluster that is evaluated pair by pair: `values` are rows of `width`, of
-/// which a column for every camera arrival comes first, and `pdfs` are `q p` of the same.
+/// which a column for every camera arrival comes first, and `pdfs` are `q p` of the same; `parts`: what
+/// [`Weights::apart`](super::weigh::Weights::apart) says.
 pub(super) fn leave_out(
     s: Sampled,
     c: &Cluster,
     pdfs: &[f32],
     values: &mut [Vec3],
     width: usize,
-    densities: &mut [Density],
+    densities: &[Density],
+    parts: &mut [f32],
 ) {
     let n = c.cameras as usize;
     for (row, values) in values.chunks_mut(width).enumerate() {
@@ -82,7 +84,7 @@ pub(super) fn leave_out(
             };
             *value *= apart;
             if column == row {
-                densities[row].apart = apart;
+                parts[row] = apart;
             }
         }
     }

@@ -45,9 +45,9 @@ pub fn sort_out(keys: &mut [(u64, u32)], all: Numbered) {
     let seen = KeySet::new(camera.len());
     camera.par_iter().for_each(|&(key, _)| seen.insert(key));
     let left = KeySet::new(light.len());
-    light.par_windows(2).zip(all.light).for_each(|(pair, a)| {
+    light.par_windows(2).enumerate().for_each(|(j, pair)| {
         // the next of the store, if the path has one
-        if a.goes_on && seen.has(pair[1].0) {
+        if all.light.get(j).goes_on && seen.has(pair[1].0) {
             left.insert(pair[0].0);
         }
     });

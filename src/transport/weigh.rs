@@ -7,15 +7,15 @@
 
 use super::bridge::Bridges;
 use super::cluster::{Cluster, Clusters};
-use super::returns::{Gathered, leave_out, ratio};
+use super::paired;
+use super::returns::{Gathered, ratio};
+use super::sparse::Sparse;
 use super::store::{CameraStore, LightStore, NextEvent};
 use super::{Cut, Estimator};
-use crate::math::density::ProjectedPdf;
-use crate::shading::bsdf::{Among, Bsdf};
+use crate::math::SharedExponent;
 use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::borrow::Cow;
 
 /// Densities of one arrival.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,9 +25,6 @@ pub struct Density {
     /// `P_light` of the segment that brought a camera arrival; of the segment that leaves a light arrival, for
     /// leaving one out without the part of its own path.
     pub light: f32,
-    /// `P_cam` of the segment that leaves a camera arrival, over the same without the part of its path's other
-    /// arrivals; one where it has none, or nobody leaves them out.
-    pub apart: f32,
 }
 
 /// The next-event segment of a camera arrival.
@@ -43,8 +40,7 @@ pub struct TowardsLight {
 /// every light arrival), those of the directions of all segments that leave, then those of all photons, then those of all
 /// bridges, the latter two times `(n_o / n_i)^2`.
 #[derive(Clone, Copy, Debug)]
-pub struct Matrix {
-    batch: u32,
+struct Matrix {
     start: u32,
     columns: u32,
     owns: u32,
@@ -56,16 +52,18 @@ pub struct Matrix {
 pub struct Weights {
     /// One for every arrival.
     pub densities: Vec<Density>,
-    /// Basic radiance from next-event segments, reflected at every camera arrival; at light arrivals, for the
-    /// literal recursion, towards where their paths go on.
-    pub direct: Vec<Vec3>,
     /// Irradiance, weighed, from the bridge of every camera arrival; empty without any.
     pub bridged: Vec<Vec3>,
     /// One for every arrival, of use for those of the camera; empty unless whole paths are asked for.
     pub towards_lights: Vec<TowardsLight>,
-    /// One for every cluster; unused for diffuse ones.
-    matrices: Vec<Matrix>,
-    values: Vec<Vec<Vec3>>,
+    /// See [`Weights::direct`].
+    direct: Vec<SharedExponent>,
+    /// See [`Weights::apart`]; where it is not one.
+    apart: Sparse<f32>,
+    /// One for every cluster that is not diffuse.
+    matrices: Sparse<Matrix>,
+    /// Values of each batch of clusters.
+    values: Vec<Vec<SharedExponent>>,
     owns: Vec<Vec<f32>>,
 }
 
@@ -108,13 +106,13 @@ impl<'a> Sampled<'a> {
 
     /// Path of light arrival `j`.
     #[inline]
-    fn path(&self, j: usize) -> u32 {
-        self.light.photons[j].path
+    pub(super) fn path(&self, j: usize) -> u32 {
+        self.light.photons.path(j)
     }
 
     /// For every light arrival of the cluster, in their order: the sum of `q` over those of its path there.
     pub fn path_survivals(&self, c: &Cluster) -> Vec<f32> {
-        let mut q: Vec<f32> = self.lights(c).map(|j| self.light.arrivals[j].survival).collect();
+        let mut q: Vec<f32> = self.lights(c).map(|j| self.light.arrivals.survival(j)).collect();
         self.sum_over_paths(c, &mut q);
         q
     }
@@ -137,15 +135,23 @@ impl<'a> Sampled<'a> {
     }
 }
 
+/// What a batch of clusters comes to, beside what has a place for every arrival.
 #[derive(Default)]
-struct Batch {
-    densities: Vec<Density>,
-    direct: Vec<Vec3>,
-    bridged: Vec<Vec3>,
-    towards_lights: Vec<TowardsLight>,
-    starts: Vec<(u32, u32)>,
-    values: Vec<Vec3>,
-    owns: Vec<f32>,
+pub(super) struct Batch {
+    apart: Vec<(u32, f32)>,
+    pub bridged: Vec<Vec3>,
+    pub towards_lights: Vec<TowardsLight>,
+    matrices: Sparse<Matrix>,
+    pub values: Vec<SharedExponent>,
+    pub owns: Vec<f32>,
+}
+
+/// Where the figures of a cluster's arrivals go.
+pub(super) struct Places<'a> {
+    pub densities: &'a mut [Density],
+    pub direct: &'a mut [SharedExponent],
+    /// What [`Weights::apart`] says.
+    pub apart: Vec<f32>,
 }
 
 impl Weights {
@@ -154,80 +160,135 @@ impl Weights {
         // the lobes' values are most of the memory: not twice
         self.values.clear();
         self.owns.clear();
-        let batches: Vec<Batch> = s
-            .clusters
-            .clusters
-            .par_chunks(BATCH)
-            .map(|clusters| {
-                let mut batch = Batch::default();
-                for c in clusters {
-                    if cut.is_raised() {
-                        break;
-                    }
-                    batch.starts.push((batch.values.len() as u32, batch.owns.len() as u32));
-                    match c.class {
-                        SurfaceClass::Diffuse => diffuse(s, c, estimator, &mut batch),
-                        SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                            paired(s, c, estimator, &mut batch)
-                        }
-                    }
-                }
-                batch
-            })
-            .collect();
+        self.densities.clear();
+        self.direct.clear();
+        let places = s.clusters.order.len();
+        self.densities.reserve_exact(places);
+        self.densities.resize(places, Density::default());
+        self.direct.reserve_exact(places);
+        self.direct.resize(places, SharedExponent::default());
+        let (mut densities, mut direct) = (&mut self.densities[..], &mut self.direct[..]);
+        let mut jobs = Vec::new();
+        for clusters in s.clusters.clusters.chunks(BATCH) {
+            let arrivals = clusters.iter().map(|c| (c.cameras + c.lights) as usize).sum();
+            let (here, rest) = std::mem::take(&mut densities).split_at_mut(arrivals);
+            let (lit, unlit) = std::mem::take(&mut direct).split_at_mut(arrivals);
+            (densities, direct) = (rest, unlit);
+            jobs.push((clusters, here, lit));
+        }
+        let weigh =
+            |(clusters, densities, direct)| Batch::weigh(s, clusters, densities, direct, estimator, cut);
+        let batches: Vec<Batch> = jobs.into_par_iter().map(weigh).collect();
         if cut.is_raised() {
             return false;
         }
-        self.densities.clear();
-        self.direct.clear();
         self.bridged.clear();
         self.towards_lights.clear();
+        self.apart.clear();
+        self.apart.reserve(places, batches.iter().map(|b| b.apart.len()).sum());
         self.matrices.clear();
-        let groups = s.clusters.clusters.chunks(BATCH);
-        for ((b, batch), clusters) in (0..).zip(batches).zip(groups) {
-            self.densities.extend(batch.densities);
-            self.direct.extend(batch.direct);
+        let matrices = batches.iter().map(|b| b.matrices.count()).sum();
+        self.matrices.reserve(s.clusters.clusters.len(), matrices);
+        for mut batch in batches {
+            for (place, apart) in batch.apart {
+                (self.apart.len() as u32..place).for_each(|_| self.apart.push(None));
+                self.apart.push(Some(apart));
+            }
             self.bridged.extend(batch.bridged);
             self.towards_lights.extend(batch.towards_lights);
-            self.matrices.extend(batch.starts.iter().zip(clusters).map(|(&(start, owns), c)| Matrix {
-                batch: b,
-                start,
-                columns: columns(s, c) as u32,
-                owns,
-                lights: c.lights,
-            }));
+            self.matrices.append(&mut batch.matrices);
             self.values.push(batch.values);
             self.owns.push(batch.owns);
         }
+        (self.apart.len()..places).for_each(|_| self.apart.push(None));
         true
+    }
+
+    /// Basic radiance from next-event segments, reflected at the camera arrival at a place; at a light arrival, for
+    /// the literal recursion, towards where its path goes on.
+    #[inline]
+    pub fn direct(&self, place: u32) -> Vec3 {
+        self.direct[place as usize].decode()
+    }
+
+    /// `P_cam` of the segment that leaves the camera arrival at a place, over the same without the part of its path's
+    /// other arrivals; one where it has none, or nobody leaves them out.
+    #[inline]
+    pub fn apart(&self, place: u32) -> f32 {
+        self.apart.get(place as usize).copied().unwrap_or(1.0)
     }
 
     /// Values of the lobes of the `row`-th arrival of a cluster that is not diffuse: a camera's, unless the literal
     /// recursion asked for all.
     #[inline]
-    pub fn row(&self, cluster: usize, row: usize) -> &[Vec3] {
-        let m = &self.matrices[cluster];
+    pub fn row(&self, cluster: usize, row: usize) -> &[SharedExponent] {
+        let Some(m) = self.matrices.get(cluster) else { return &[] };
         let start = m.start as usize + row * m.columns as usize;
-        &self.values[m.batch as usize][start..start + m.columns as usize]
+        &self.values[cluster / BATCH][start..start + m.columns as usize]
     }
 
     /// Of the segment that brought the `row`-th camera arrival of a cluster that is not diffuse: for every light arrival,
     /// its path's part of `P_light`.
     #[inline]
     pub fn own(&self, cluster: usize, row: usize) -> &[f32] {
-        let m = &self.matrices[cluster];
+        let Some(m) = self.matrices.get(cluster) else { return &[] };
         let start = m.owns as usize + row * m.lights as usize;
-        &self.owns[m.batch as usize][start..start + m.lights as usize]
+        &self.owns[cluster / BATCH][start..start + m.lights as usize]
     }
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         self.densities.capacity() * size_of::<Density>()
-            + (self.direct.capacity() + self.bridged.capacity()) * size_of::<Vec3>()
+            + self.direct.capacity() * size_of::<SharedExponent>()
+            + self.bridged.capacity() * size_of::<Vec3>()
             + self.towards_lights.capacity() * size_of::<TowardsLight>()
-            + self.matrices.capacity() * size_of::<Matrix>()
-            + self.values.iter().map(|v| v.capacity() * size_of::<Vec3>()).sum::<usize>()
+            + self.apart.bytes()
+            + self.matrices.bytes()
+            + self.values.iter().map(|v| v.capacity() * size_of::<SharedExponent>()).sum::<usize>()
             + self.owns.iter().map(|v| v.capacity() * size_of::<f32>()).sum::<usize>()
+    }
+}
+
+impl Batch {
+    /// Weighs some clusters, whose arrivals follow each other.
+    fn weigh(
+        s: Sampled,
+        clusters: &[Cluster],
+        mut densities: &mut [Density],
+        mut direct: &mut [SharedExponent],
+        estimator: Estimator,
+        cut: &Cut,
+    ) -> Self {
+        let mut batch = Self::default();
+        let in_pairs = || clusters.iter().filter(|c| c.class != SurfaceClass::Diffuse);
+        let pairs = |c: &Cluster| rows(c, estimator) * columns(s, c);
+        batch.values.reserve_exact(in_pairs().map(pairs).sum());
+        batch.owns.reserve_exact(in_pairs().map(|c| (c.cameras * c.lights) as usize).sum());
+        for c in clusters {
+            if cut.is_raised() {
+                break;
+            }
+            let arrivals = (c.cameras + c.lights) as usize;
+            let (here, rest) = std::mem::take(&mut densities).split_at_mut(arrivals);
+            let (lit, unlit) = std::mem::take(&mut direct).split_at_mut(arrivals);
+            (densities, direct) = (rest, unlit);
+            let mut places = Places { densities: here, direct: lit, apart: vec![1.0; c.cameras as usize] };
+            batch.matrices.push((c.class != SurfaceClass::Diffuse).then(|| Matrix {
+                start: batch.values.len() as u32,
+                columns: columns(s, c) as u32,
+                owns: batch.owns.len() as u32,
+                lights: c.lights,
+            }));
+            match c.class {
+                SurfaceClass::Diffuse => diffuse(s, c, estimator, &mut places, &mut batch),
+                SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
+                    paired::weigh(s, c, estimator, &mut places, &mut batch);
+                }
+            }
+            let apart = (c.first..).zip(places.apart);
+            batch.apart.extend(apart.filter(|&(_, apart)| apart != 1.0));
+        }
+        batch
     }
 }
 
@@ -240,173 +301,66 @@ pub(super) fn next_event_density(n: &NextEvent, p_cam: f32, c: &Cluster) -> f32 
 
 /// Basic radiance times the weight of a next-event segment over its own density, `E / D_E`, see
 /// [`next_event_density`].
-fn next_event_value(n: &NextEvent, p_cam: f32, c: &Cluster) -> Vec3 {
+pub(super) fn next_event_value(n: &NextEvent, p_cam: f32, c: &Cluster) -> Vec3 {
     let density = next_event_density(n, p_cam, c);
     if density > 0.0 { n.light / density } else { Vec3::ZERO }
 }
 
 /// Directions that are looked at in a cluster: of segments that leave, of photons, of bridges.
-fn columns(s: Sampled, c: &Cluster) -> usize {
+pub(super) fn columns(s: Sampled, c: &Cluster) -> usize {
     (c.cameras + c.lights + s.bridges.map_or(0, |_| c.cameras)) as usize
 }
 
-fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
+/// Arrivals of a cluster whose lobes are looked at.
+fn rows(c: &Cluster, estimator: Estimator) -> usize {
+    (c.cameras + if estimator == Estimator::Literal { c.lights } else { 0 }) as usize
+}
+
+fn diffuse(s: Sampled, c: &Cluster, estimator: Estimator, places: &mut Places, batch: &mut Batch) {
     let sum = |q: &mut dyn Iterator<Item = f32>| q.map(f64::from).sum::<f64>();
-    let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals[i].survival)) as f32;
-    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals[j].survival)) as f32;
+    let q_camera = sum(&mut s.cameras(c).map(|i| s.camera.arrivals.survival(i))) as f32;
+    let q_light = sum(&mut s.lights(c).map(|j| s.light.arrivals.survival(j))) as f32;
     let mut arriving = DVec3::ZERO;
     for i in s.cameras(c) {
-        let n = &s.camera.next_events[i];
-        if n.next_event_pdf > 0.0 {
-            arriving += (next_event_value(n, q_camera * n.pdf, c) * n.pdf).as_dvec3();
+        if let Some(n) = s.camera.next_events.get(i) {
+            arriving += (next_event_value(&n, q_camera * n.pdf, c) * n.pdf).as_dvec3();
         }
     }
     let arriving = arriving.as_vec3() / c.area;
     for (row, i) in s.cameras(c).enumerate() {
-        let a = &s.camera.arrivals[i];
+        let (reflectance, back_pdf) = (s.camera.arrivals.reflectance(i), s.camera.arrivals.back_pdf(i));
         let gathered = Gathered::new(s, c, row);
-        let apart = match estimator == Estimator::LeaveOneOut && !gathered.is_all() {
-            true => {
-                let q = gathered.arrivals(s, c).map(|i| s.camera.arrivals[i].survival);
-                ratio(q_camera, q.sum())
-            }
-            false => 1.0,
-        };
-        let camera = q_camera * s.camera.outgoing[i].pdf;
-        batch.densities.push(Density { camera, light: q_light * a.back_pdf, apart });
-        batch.direct.push(a.reflectance * arriving);
+        if estimator == Estimator::LeaveOneOut && !gathered.is_all() {
+            let q = gathered.arrivals(s, c).map(|i| s.camera.arrivals.survival(i));
+            places.apart[row] = ratio(q_camera, q.sum());
+        }
+        let camera = q_camera * s.camera.outgoing.pdf(i);
+        places.densities[row] = Density { camera, light: q_light * back_pdf };
+        places.direct[row] = SharedExponent::encode(reflectance * arriving);
         if let Some(bridges) = s.bridges {
             let b = &bridges.segments[i];
             batch.bridged.push(b.value(q_camera * b.pdf, c));
         }
     }
-    for (j, own) in s.lights(c).zip(s.path_survivals(c)) {
-        let a = &s.light.arrivals[j];
+    let rows = c.cameras as usize..;
+    for ((row, j), own) in rows.zip(s.lights(c)).zip(s.path_survivals(c)) {
         let q = match estimator {
             Estimator::LeaveOneOut => (q_light - own).max(0.0),
             Estimator::Literal | Estimator::WholePath => q_light,
         };
-        batch.densities.push(Density {
-            camera: q_camera * a.back_pdf,
-            light: q * s.light.photons[j].pdf,
-            apart: 1.0,
-        });
-        batch.direct.push(a.reflectance * arriving);
+        places.densities[row] =
+            Density { camera: q_camera * s.light.arrivals.back_pdf(j), light: q * s.light.photons.pdf(j) };
+        if estimator == Estimator::Literal {
+            places.direct[row] = SharedExponent::encode(s.light.arrivals.reflectance(j) * arriving);
+        }
         batch.bridged.extend(s.bridges.map(|_| Vec3::ZERO));
     }
     if estimator == Estimator::WholePath {
         batch.towards_lights.extend(s.cameras(c).map(|i| {
-            let pdf = s.camera.next_events[i].pdf;
-            TowardsLight { value: s.camera.arrivals[i].reflectance * pdf, camera: q_camera * pdf }
+            let pdf = s.camera.next_events.get(i).map_or(0.0, |n| n.pdf);
+            TowardsLight { value: s.camera.arrivals.reflectance(i) * pdf, camera: q_camera * pdf }
         }));
-        batch.towards_lights.resize(batch.densities.len(), TowardsLight::default());
-    }
-}
-
-fn paired(s: Sampled, c: &Cluster, estimator: Estimator, batch: &mut Batch) {
-    let cameras: Vec<(usize, Bsdf)> = s.cameras(c).map(|i| (i, s.camera.arrivals[i].bsdf(s.world))).collect();
-    let lights: Vec<(usize, Bsdf)> = s.lights(c).map(|j| (j, s.light.arrivals[j].bsdf(s.world))).collect();
-    let (n, m) = (cameras.len(), lights.len());
-    let width = columns(s, c);
-    let first = batch.densities.len();
-    batch.densities.resize(first + n + m, Density { apart: 1.0, ..Density::default() });
-    batch.direct.resize(first + n + m, Vec3::ZERO);
-    let matrix = batch.values.len();
-    // who gathers, as seen from where, and with which `q`: a light arrival's path is no technique of the camera
-    let mut gatherers: Vec<(Cow<Bsdf>, Vec3, f32)> = cameras
-        .iter()
-        .map(|(i, bsdf)| (Cow::Borrowed(bsdf), s.camera.arrivals[*i].wo, s.camera.arrivals[*i].survival))
-        .collect();
-    if estimator == Estimator::Literal {
-        gatherers.extend(s.lights(c).map(|j| {
-            let a = &s.light.arrivals[j];
-            // nobody reads what one gathers whose path ends
-            let wo = if a.goes_on { s.light.photons[j].direction } else { a.wo };
-            (Cow::Owned(a.bsdf_from(s.world, wo)), wo, 0.0)
-        }));
-    }
-    let rows = gatherers.len();
-    let owns = batch.owns.len();
-    batch.owns.resize(owns + n * m, 0.0);
-    batch.values.resize(matrix + rows * width, Vec3::ZERO);
-    let densities = &mut batch.densities[first..];
-    let bridges = cameras.iter().filter_map(|(i, _)| Some(&s.bridges?.segments[*i]));
-    let mut bridge_pdfs = vec![0.0; n];
-    let mut next_event_pdfs = vec![0.0; n];
-    let mut next_event_values = vec![Vec3::ZERO; rows * n];
-    let mut leaving_pdfs = vec![0.0; rows * n];
-    for (row, (bsdf, wo, q)) in gatherers.iter().enumerate() {
-        let sight = bsdf.sight(*wo, Among::Continuous);
-        let look = |w: Vec3| {
-            let (value, ProjectedPdf(pdf)) =
-                sight.as_ref().map_or((Vec3::ZERO, ProjectedPdf(0.0)), |s| s.look(w));
-            (q * pdf, value)
-        };
-        for (column, (i, _)) in cameras.iter().enumerate() {
-            if s.camera.arrivals[*i].goes_on {
-                let (pdf, value) = look(s.camera.outgoing[*i].direction);
-                densities[column].camera += pdf;
-                leaving_pdfs[row * n + column] = pdf;
-                batch.values[matrix + row * width + column] = value;
-            }
-            let next_event = &s.camera.next_events[*i];
-            if next_event.next_event_pdf > 0.0 {
-                let (pdf, value) = look(next_event.direction);
-                next_event_pdfs[column] += pdf;
-                next_event_values[row * n + column] = value;
-            }
-        }
-        for (column, (j, _)) in lights.iter().enumerate() {
-            let w = s.light.arrivals[*j].wo;
-            let (pdf, value) = look(w);
-            densities[n + column].camera += pdf;
-            batch.values[matrix + row * width + n + column] = value / bsdf.relative_index(*wo, w).powi(2);
-        }
-        for (column, b) in bridges.clone().enumerate() {
-            let (pdf, value) = look(b.direction);
-            bridge_pdfs[column] += pdf;
-            batch.values[matrix + row * width + n + m + column] =
-                value / bsdf.relative_index(*wo, b.direction).powi(2);
-        }
-    }
-    if estimator == Estimator::LeaveOneOut {
-        leave_out(s, c, &leaving_pdfs, &mut batch.values[matrix..], width, densities);
-    }
-    if s.bridges.is_some() {
-        batch.bridged.extend(bridges.zip(&bridge_pdfs).map(|(b, &p_cam)| b.value(p_cam, c)));
-        batch.bridged.resize(first + n + m, Vec3::ZERO);
-    }
-    for (t, (own, bsdf)) in lights.iter().enumerate() {
-        let a = &s.light.arrivals[*own];
-        let sight = bsdf.sight(a.wo, Among::Continuous);
-        let pdf = |w: Vec3| sight.as_ref().map_or(0.0, |s| a.survival * s.pdf(w).0);
-        for (row, (i, _)) in cameras.iter().enumerate() {
-            let part = pdf(s.camera.arrivals[*i].wo);
-            densities[row].light += part;
-            batch.owns[owns + row * m + t] = part;
-        }
-        for (other, (j, _)) in lights.iter().enumerate() {
-            let is_rival = estimator != Estimator::LeaveOneOut || s.path(*j) != s.path(*own);
-            if is_rival && s.light.arrivals[*j].goes_on {
-                densities[n + other].light += pdf(s.light.photons[*j].direction);
-            }
-        }
-    }
-    for row in 0..n {
-        s.sum_over_paths(c, &mut batch.owns[owns + row * m..][..m]);
-    }
-    for (column, (i, _)) in cameras.iter().enumerate() {
-        let next_event = &s.camera.next_events[*i];
-        if next_event.next_event_pdf > 0.0 {
-            let value = next_event_value(next_event, next_event_pdfs[column], c) / c.area;
-            for row in 0..rows {
-                batch.direct[first + row] += next_event_values[row * n + column] * value;
-            }
-        }
-    }
-    if estimator == Estimator::WholePath {
-        let own = |k: usize| TowardsLight { value: next_event_values[k * n + k], camera: next_event_pdfs[k] };
-        batch.towards_lights.extend((0..n).map(own));
-        batch.towards_lights.resize(batch.densities.len(), TowardsLight::default());
+        let none = (0..c.lights).map(|_| TowardsLight::default());
+        batch.towards_lights.extend(none);
     }
 }

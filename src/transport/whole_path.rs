@@ -40,11 +40,11 @@
 use super::Cut;
 use super::arrival::{early_survival, reversed};
 use super::camera::EARLY;
-use super::exchange::{Segment, has_end, reciprocal, segments};
-use super::photons::FromPhotons;
+use super::exchange::{Densities, Segments, has_end, reciprocal};
 use super::propagate::Reflected;
-use super::store::{EmissionHit, Rivals};
+use super::store::{EmissionHit, NextEvent, Rivals};
 use super::weigh::{Sampled, Weights};
+use crate::math::SharedExponent;
 use crate::shading::SurfaceClass;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -86,7 +86,6 @@ struct Step {
 struct WholePaths<'a> {
     s: Sampled<'a>,
     w: &'a Weights,
-    segments: &'a [Segment],
     rests: Vec<Rest>,
 }
 
@@ -101,8 +100,8 @@ impl Reflected {
         bounces: Option<u32>,
         cut: &Cut,
     ) -> bool {
-        self.segments = segments(s, w);
-        let paths = WholePaths { s, w, segments: &self.segments, rests: rests(s, w) };
+        self.segments = Segments::new(s, w);
+        let paths = WholePaths { s, w, rests: rests(s, w) };
         let most = bounces.unwrap_or(u32::MAX);
         let one = |&(start, passages): &(u32, u32)| match cut.is_raised() {
             true => (Vec3::ZERO, Vec3::ZERO),
@@ -110,10 +109,11 @@ impl Reflected {
         };
         let light: Vec<(Vec3, Vec3)> = first.par_iter().map(one).collect();
         let n = s.camera.arrivals.len();
-        (self.carried, self.photons) = (vec![Vec3::ZERO; n], vec![FromPhotons::default(); n]);
-        self.direct = vec![Vec3::ZERO; n];
+        let nothing = || vec![SharedExponent::default(); n];
+        (self.carried, self.photons, self.direct) = (nothing(), nothing(), nothing());
         for (&(arrival, _), (all, direct)) in first.iter().zip(light) {
-            (self.carried[arrival as usize], self.direct[arrival as usize]) = (all, direct);
+            self.carried[arrival as usize] = SharedExponent::encode(all);
+            self.direct[arrival as usize] = SharedExponent::encode(direct);
         }
         !cut.is_raised()
     }
@@ -128,7 +128,7 @@ fn mean(sum: f32, count: u32) -> f32 {
 fn rests(s: Sampled, w: &Weights) -> Vec<Rest> {
     let steps: Vec<Step> = (0..s.light.photons.len()).into_par_iter().map(|j| step(s, w, j)).collect();
     let mut before = Step::default();
-    let along_paths = steps.iter().zip(&s.light.photons).map(|(step, photon)| {
+    let along_paths = steps.iter().zip(s.light.photons.iter()).map(|(step, photon)| {
         if let Rivals::First { .. } = photon.rivals {
             before = Step::default();
         }
@@ -145,7 +145,7 @@ fn rests(s: Sampled, w: &Weights) -> Vec<Rest> {
 
 fn step(s: Sampled, w: &Weights, j: usize) -> Step {
     let i = s.camera.arrivals.len() + j;
-    let (here, photon, a) = (s.cluster_of(i), &s.light.photons[j], &s.light.arrivals[j]);
+    let (here, photon, a) = (s.cluster_of(i), s.light.photons.get(j), s.light.arrivals.get(j));
     let p_camera = w.densities[s.clusters.place[i] as usize].camera;
     let (met, next_event, own) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
@@ -168,7 +168,7 @@ fn step(s: Sampled, w: &Weights, j: usize) -> Step {
     if !a.goes_on {
         return Step { joined, ..Step::default() };
     }
-    let (q, pdf) = reversed(s.world, a, photon.direction);
+    let (q, pdf) = reversed(s.world, &a, photon.direction);
     let with = |q: f32| ratio(mean(p_camera + q * pdf, here.cameras + 1));
     Step { joined, early: with(early_survival(q)), late: with(q) }
 }
@@ -192,13 +192,13 @@ impl WholePaths<'_> {
         while at.bounces < most {
             let bounces = at.bounces + 1;
             add(bounces, at.throughput * self.next_event(i, &at));
-            self.join(i, &at, |j, light| add(bounces + s.light.photons[j].bounces, at.throughput * light));
-            if !s.camera.arrivals[i].goes_on {
+            self.join(i, &at, |j, light| add(bounces + s.light.photons.bounces(j), at.throughput * light));
+            if !s.camera.arrivals.goes_on(i) {
                 break;
             }
-            let near = self.near(i, &at, s.camera.outgoing[i].direction);
+            let near = self.near(i, &at, s.camera.outgoing.direction(i));
             for hit in self.hits(i) {
-                add(bounces + hit.passages, at.throughput * self.hit(hit, near));
+                add(bounces + hit.passages, at.throughput * self.hit(&hit, near));
             }
             if !has_end(s, i) {
                 break;
@@ -214,23 +214,20 @@ impl WholePaths<'_> {
         if at.back == 0.0 {
             return 1.0;
         }
-        let (q, pdf) = reversed(self.s.world, &self.s.camera.arrivals[i], to);
+        let (q, pdf) = reversed(self.s.world, &self.s.camera.arrivals.get(i), to);
         let p_light = self.w.densities[self.s.clusters.place[i] as usize].light;
         1.0 + at.back * mean(p_light + q * pdf, self.s.cluster_of(i).lights + 1)
     }
 
     /// Light of the arrival's next-event segment, reflected there and weighed.
     fn next_event(&self, i: usize, at: &Prefix) -> Vec3 {
-        let n = &self.s.camera.next_events[i];
-        if n.next_event_pdf <= 0.0 {
-            return Vec3::ZERO;
-        }
+        let Some(n) = self.s.camera.next_events.get(i) else { return Vec3::ZERO };
         let value = self.w.towards_lights[self.s.clusters.place[i] as usize].value;
-        value * n.light * (self.next_event_weight(i, at) / n.next_event_pdf)
+        value * n.light * (self.next_event_weight(i, &n, at) / n.next_event_pdf)
     }
 
-    fn next_event_weight(&self, i: usize, at: &Prefix) -> f32 {
-        let (n, c) = (&self.s.camera.next_events[i], self.s.cluster_of(i));
+    fn next_event_weight(&self, i: usize, n: &NextEvent, at: &Prefix) -> f32 {
+        let c = self.s.cluster_of(i);
         let p_camera = self.w.towards_lights[self.s.clusters.place[i] as usize].camera;
         let met = if n.is_delta { 0.0 } else { mean(p_camera, c.cameras) };
         let joins = n.light_density * self.near(i, at, n.direction);
@@ -239,16 +236,14 @@ impl WholePaths<'_> {
     }
 
     /// The light that the segment which leaves an arrival met.
-    fn hits(&self, i: usize) -> impl Iterator<Item = &EmissionHit> {
-        let hits = &self.s.camera.hits;
-        let first = hits.partition_point(|h| (h.arrival as usize) < i);
-        hits[first..].iter().take_while(move |h| h.arrival as usize == i)
+    fn hits(&self, i: usize) -> impl Iterator<Item = EmissionHit> {
+        self.s.camera.hits.of(i)
     }
 
     /// The same, reflected at the arrival and weighed.
     fn hit(&self, hit: &EmissionHit, near: f32) -> Vec3 {
         let i = hit.arrival as usize;
-        let density = hit.forward * self.s.camera.arrivals[i].survival * self.s.camera.outgoing[i].pdf;
+        let density = hit.forward * self.s.camera.arrivals.survival(i) * self.s.camera.outgoing.get(i).pdf;
         self.value_leaving(i) * hit.light * (self.hit_weight(hit, near) * reciprocal(density))
     }
 
@@ -268,19 +263,19 @@ impl WholePaths<'_> {
             return;
         }
         let near = self.joined_near(i, at);
-        let scale = c.inverse_area * s.camera.inverse_n2[i];
+        let scale = c.inverse_area * s.camera.inverse_n2(i);
         let mut photon = |j: usize, value: Vec3| {
-            found(j, value * s.light.photons[j].flux * (self.join_weight(j, at, near) * scale));
+            found(j, value * s.light.photons.flux(j) * (self.join_weight(j, at, near) * scale));
         };
         match c.class {
             SurfaceClass::Diffuse => {
-                let reflectance = s.camera.arrivals[i].reflectance;
-                s.lights(c).for_each(|j| photon(j, reflectance * s.light.arrivals[j].back_pdf));
+                let reflectance = s.camera.arrivals.reflectance(i);
+                s.lights(c).for_each(|j| photon(j, reflectance * s.light.arrivals.back_pdf(j)));
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (s.clusters.place[i] - c.first) as usize;
                 let values = &w.row(s.clusters.of[i] as usize, row)[c.cameras as usize..];
-                s.lights(c).zip(values).for_each(|(j, value)| photon(j, *value));
+                s.lights(c).zip(values).for_each(|(j, value)| photon(j, value.decode()));
             }
         }
     }
@@ -298,15 +293,15 @@ impl WholePaths<'_> {
 
     /// The sub-path up to the arrival after `i`.
     fn beyond(&self, i: usize, at: &Prefix, near: f32) -> Prefix {
-        let (a, out) = (&self.s.camera.arrivals[i], &self.s.camera.outgoing[i]);
-        let segment = &self.segments[i];
-        let a_next = segment.camera / self.s.cluster_of(i).cameras as f32;
+        let (a, out) = (self.s.camera.arrivals.get(i), self.s.camera.outgoing.get(i));
+        let densities = Densities::of(self.s, self.w, i);
+        let a_next = densities.camera / self.s.cluster_of(i).cameras as f32;
         let density = a.survival * out.pdf * out.forward;
         Prefix {
             throughput: at.throughput * self.value_leaving(i) * out.throughput * reciprocal(density),
             bounces: at.bounces + 1 + out.passages,
             is_first: false,
-            back: segment.light * reciprocal(a_next) * near,
+            back: densities.light * reciprocal(a_next) * near,
         }
     }
 
@@ -315,10 +310,10 @@ impl WholePaths<'_> {
         let (s, cluster) = (self.s, self.s.clusters.of[i] as usize);
         let c = &s.clusters.clusters[cluster];
         match c.class {
-            SurfaceClass::Diffuse => s.camera.arrivals[i].reflectance * s.camera.outgoing[i].pdf,
+            SurfaceClass::Diffuse => s.camera.arrivals.reflectance(i) * s.camera.outgoing.get(i).pdf,
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let row = (s.clusters.place[i] - c.first) as usize;
-                self.w.row(cluster, row)[row]
+                self.w.row(cluster, row)[row].decode()
             }
         }
     }

@@ -10,7 +10,7 @@ use segue::shading::World;
 use segue::transport::area::Cell;
 use segue::transport::cluster::{Areas, Clusters, Numbered};
 use segue::transport::grid::Grid;
-use segue::transport::store::Arrival;
+use segue::transport::store::{Arrival, Arrivals};
 use std::f64::consts::PI;
 
 const GREY: &str = r#"{"surface":{"type":"diffuse","color":0.5}}"#;
@@ -18,7 +18,7 @@ const GREY: &str = r#"{"surface":{"type":"diffuse","color":0.5}}"#;
 const EDGE: f32 = 0.12;
 
 /// Photons that fall vertically, or along -x or -y, each uniformly over the side of the unit cube that they meet.
-fn photons(world: &World, seed: u32, sides: &[Vec3], count: u32) -> Vec<Arrival> {
+fn photons(world: &World, seed: u32, sides: &[Vec3], count: u32) -> Arrivals {
     let u = |k: u32, d| hash_unit(seed ^ 0x3a11, 4 * k + d);
     (0..count)
         .filter_map(|k| {
@@ -38,22 +38,22 @@ fn both_areas(world: &World, grid: &Grid, all: Numbered) -> [Vec<f32>; 2] {
     let by_plane = clusters.of.iter().map(|&c| {
         let representative = first(c);
         let voxel = grid.voxel(representative.position);
-        Cell { grid, voxel, representative, parted: None }.plane_cut(representative.position)
+        Cell { grid, voxel, representative: &representative, parted: None }.plane_cut(representative.position)
     });
     [by_rays.collect(), by_plane.collect()]
 }
 
 /// True areas of the clusters of some arrivals, where they are known.
-type Truth<'a> = &'a dyn Fn(&Grid, &[Arrival]) -> Vec<Option<f64>>;
+type Truth<'a> = &'a dyn Fn(&Grid, &Arrivals) -> Vec<Option<f64>>;
 
 /// Mean of the true area over the estimate, by the method of the engine and by the paper's plane.
-fn bias(world: &World, seeds: u32, photons: impl Fn(u32) -> Vec<Arrival>, truth: Truth) -> [f64; 2] {
+fn bias(world: &World, seeds: u32, photons: impl Fn(u32) -> Arrivals, truth: Truth) -> [f64; 2] {
     let sensor = sensor(EDGE);
     let (mut sums, mut count) = ([0.0; 2], 0.0);
     for seed in 0..seeds {
         let photons = photons(seed);
         let grid = Grid::new(&sensor, 1.0, seed);
-        let all = Numbered { camera: &[], light: &photons };
+        let all = Numbered { camera: &Arrivals::default(), light: &photons };
         let areas = both_areas(world, &grid, all);
         for (i, exact) in truth(&grid, &photons).into_iter().enumerate() {
             let Some(exact) = exact else { continue };
@@ -67,8 +67,8 @@ fn bias(world: &World, seeds: u32, photons: impl Fn(u32) -> Vec<Arrival>, truth:
 }
 
 /// The part of a voxel in which one of the faces `x = 0`, `y = 0` or `z = 0` of the positive octant lies: a rectangle.
-fn of_octant(grid: &Grid, arrivals: &[Arrival], sides: &[Vec3]) -> Vec<Option<f64>> {
-    let area = |a: &Arrival| {
+fn of_octant(grid: &Grid, arrivals: &Arrivals, sides: &[Vec3]) -> Vec<Option<f64>> {
+    let area = |a: Arrival| {
         let (low, edge) = grid.place(&grid.voxel(a.position));
         let extent = low + edge - low.max(Vec3::ZERO);
         let along_the_face = a.normal.abs().cmplt(Vec3::splat(0.5));
@@ -139,8 +139,8 @@ fn a_ribbon_that_few_points_of_its_voxels_meet() {
         let from = |k| Vec3::new(x + width * u(k, 0), u(k, 1), 1.0);
         (0..400).filter_map(|k| arrive(&world, from(k), -Vec3::Z)).collect()
     };
-    let truth = |grid: &Grid, arrivals: &[Arrival]| {
-        let area = |a: &Arrival| {
+    let truth = |grid: &Grid, arrivals: &Arrivals| {
+        let area = |a: Arrival| {
             let (low, edge) = grid.place(&grid.voxel(a.position));
             let across = (low.x + edge).min(x + width) - low.x.max(x);
             (low.y >= 0.0 && low.y + edge < 1.0).then(|| f64::from(across * edge))
@@ -178,7 +178,7 @@ fn a_tilted_plane_is_cut_exactly() {
             .count();
         let exact = inside as f32 * cell * cell / a.normal.z.abs();
         let mut clusters = Clusters::default();
-        let all = Numbered { camera: &[], light: &[a, a] };
+        let all = Numbered { camera: &Arrivals::default(), light: &[a, a].into_iter().collect() };
         assert!(
             clusters.group(&world, &grid, all, &ON) && clusters.measure(&world, &grid, all, Areas::True, &ON)
         );
@@ -198,7 +198,7 @@ fn photons_on_spheres_are_as_dense_as_they_are() {
         let mesh = s.mesh(&points, &triangles, Some(&points));
         s.place(mesh, grey, DMat4::from_scale(DVec3::splat(f64::from(radius))));
         let world = world(&mut s);
-        let uniform = |seed: u32, count: u32| -> Vec<Arrival> {
+        let uniform = |seed: u32, count: u32| -> Arrivals {
             let direction =
                 |k: u32| warp::uniform_sphere(Vec2::new(hash_unit(seed, 2 * k), hash_unit(seed, 2 * k + 1)));
             (0..count).filter_map(|k| arrive(&world, 2.0 * radius * direction(k), -direction(k))).collect()

@@ -158,13 +158,15 @@ impl Vertices {
     fn trace_light(&mut self, context: &Context, rules: &Rules, index: u32) {
         let paths = rules.light_paths as u32;
         let wanted = |film| is_wanted(film, context.filter, context.crop);
-        let batches = context.light_batches(paths, |k, store, rays| {
+        let path = |k, store: &mut _, rays: &mut u64| {
             // the paths of one iteration are stratified among each other
             let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k);
             light::path(rules, &mut random, &wanted, store, rays);
-        });
+        };
         self.light.clear();
-        batches.into_iter().for_each(|mut store| self.light.append(&mut store));
+        context.light_batches(paths, path, |batches| {
+            batches.into_iter().for_each(|mut store| self.light.append(&mut store));
+        });
     }
 
     fn trace_camera(&mut self, context: &Context, rules: Rules, index: u32) {
@@ -176,14 +178,14 @@ impl Vertices {
         };
         let crop = context.crop;
         let (pixels, paths) = (crop.area() as u64, self.light.path_ends.len() as u64);
-        let rows = context.camera_rows(|x, y, samples: &mut Vec<Sample>, rays| {
+        self.samples.clear();
+        let path = |x: u32, y: u32, samples: &mut Vec<Sample>, rays: &mut u64| {
             let (ray, mut random) = context.camera_sample(x, y, index);
             let pixel = u64::from(y) * u64::from(crop.width) + u64::from(x);
             let mate = (pixel * paths / pixels) as usize;
             samples.push(sampler.path(&ray, &mut random, mate, rays));
-        });
-        self.samples.clear();
-        rows.into_iter().for_each(|mut row| self.samples.append(&mut row));
+        };
+        context.camera_rows(path, |rows| rows.into_iter().for_each(|mut row| self.samples.append(&mut row)));
     }
 
     /// One sample for every pixel.

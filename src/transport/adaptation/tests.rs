@@ -2,6 +2,7 @@ use super::*;
 use crate::math::sampler::hash_unit;
 use crate::scene::Camera;
 use crate::shading::{Address, SurfaceClass};
+use crate::transport::store::Arrival;
 use crate::transport::testing::ON;
 use glam::{Vec2, Vec3};
 
@@ -15,7 +16,7 @@ fn sensor() -> Sensor {
 }
 
 /// What every pixel sees of a wall; `depth` is where it stands.
-fn wall(sensor: &Sensor, depth: impl Fn(u32, u32) -> f32) -> (Vec<Primary>, Vec<Arrival>) {
+fn wall(sensor: &Sensor, depth: impl Fn(u32, u32) -> f32) -> (Vec<Primary>, Arrivals) {
     let arrival = |(x, y): (u32, u32)| {
         let ray = sensor.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), Vec2::ZERO);
         Arrival {

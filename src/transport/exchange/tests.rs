@@ -19,10 +19,7 @@ fn both_ways(world: &World, count: u32) -> (CameraStore, LightStore) {
     let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
     let follow = Follow { world, walk: Walk::Camera, from_camera: false };
     let mut push = |a: Arrival, out: Outgoing| {
-        camera.arrivals.push(a);
-        camera.inverse_n2.push(1.0);
-        camera.outgoing.push(out);
-        camera.next_events.push(NextEvent::default());
+        camera.push(a, 1.0, NextEvent::default(), out);
     };
     for k in 0..count {
         let mut sampler = Sampler::new(5, 0, k);
@@ -84,7 +81,7 @@ fn the_weights_of_all_techniques_sum_to_one() {
             (clustered(&world, &camera, &light, Areas::OfPhotons), Weights::default());
         let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
         assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
-        let constants = segments(s, &weights);
+        let constants = Segments::new(s, &weights);
         let (mut checked, mut through_glass, mut shared) = (0, 0, 0);
         for i in (0..camera.arrivals.len()).step_by(2) {
             let n = camera.arrivals.len();
@@ -97,9 +94,9 @@ fn the_weights_of_all_techniques_sum_to_one() {
             if returns && end.class != SurfaceClass::Diffuse {
                 continue;
             }
-            let twin = if returns { light.arrivals[i + 1].survival } else { 0.0 };
-            let own = (light.arrivals[i].survival + twin) * light.photons[i].pdf;
-            let segment = &constants[i];
+            let twin = if returns { light.arrivals.get(i + 1).survival } else { 0.0 };
+            let own = (light.arrivals.get(i).survival + twin) * light.photons.get(i).pdf;
+            let segment = Densities::of(s, &weights, i);
             let p_light = weights.densities[clusters.place[i + 1] as usize].light;
             // the light path itself is left out both ways, all of it
             let camera_weight = segment.camera / (segment.camera + segment.light * (p_light - own).max(0.0));
@@ -108,10 +105,10 @@ fn the_weights_of_all_techniques_sum_to_one() {
             assert!((sum - 1.0).abs() < 2e-4, "{wall}, {i}: {camera_weight} + {light_weight}");
             // and with the light path itself among the techniques
             let all = segment.camera + segment.light * p_light;
-            let carried = segment.carry / camera.outgoing[i].throughput * all;
+            let carried = constants.carry(s, i) / camera.outgoing.throughput(i) * all;
             assert!((carried - Vec3::ONE).abs().max_element() < 1e-4, "{carried}");
             checked += 1;
-            through_glass += u32::from(camera.outgoing[i].passages > 0);
+            through_glass += u32::from(camera.outgoing.get(i).passages > 0);
             shared += u32::from(end.lights > 1);
         }
         assert!(checked > 500 && through_glass > 50 && shared > 100, "{checked} {through_glass} {shared}");
@@ -125,15 +122,12 @@ fn sums_over_ten_million_segments_are_as_good_as_in_double_precision() {
     let world = room(r#"{"surface":{"type":"diffuse","color":0.6}}"#);
     let (one, light) = (both_ways(&world, 1).0, LightStore::default());
     let of = |k: u32, n: u32| hash_unit(hash(k, n), 3);
-    let arrivals = (0..COUNT).map(|k| Arrival { survival: of(k, 1), ..one.arrivals[0] });
-    let outgoing = (0..COUNT).map(|k| Outgoing { pdf: of(k, 2), ..one.outgoing[0] });
-    let camera = CameraStore {
-        arrivals: arrivals.collect(),
-        inverse_n2: vec![1.0; COUNT as usize],
-        outgoing: outgoing.collect(),
-        next_events: vec![NextEvent::default(); COUNT as usize],
-        ..CameraStore::default()
-    };
+    let mut camera = CameraStore::default();
+    for k in 0..COUNT {
+        let arrival = Arrival { survival: of(k, 1), ..one.arrivals.get(0) };
+        let outgoing = Outgoing { pdf: of(k, 2), ..one.outgoing.get(0) };
+        camera.push(arrival, 1.0, NextEvent::default(), outgoing);
+    }
     let values: Vec<Vec3> = (0..COUNT).map(|k| Vec3::new(1.0, of(k, 3), 1e10f32.powf(of(k, 4)))).collect();
     let (clusters, mut weights) = (clustered(&world, &camera, &light, Areas::None), Weights::default());
     let s = Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
@@ -141,14 +135,14 @@ fn sums_over_ten_million_segments_are_as_good_as_in_double_precision() {
     let cluster = s.cluster_of(0);
     assert_eq!(cluster.cameras, COUNT);
 
-    let exact: DVec3 =
-        values.iter().zip(&camera.outgoing).map(|(v, out)| v.as_dvec3() * f64::from(out.pdf)).sum();
-    let expected = camera.arrivals[0].reflectance.as_dvec3() * exact / f64::from(cluster.area);
-    let got = gather(s, &weights, &values, &ON)[0].as_dvec3();
+    let arriving = |(i, v): (usize, &Vec3)| v.as_dvec3() * f64::from(camera.outgoing.pdf(i));
+    let exact: DVec3 = values.iter().enumerate().map(arriving).sum();
+    let expected = camera.arrivals.get(0).reflectance.as_dvec3() * exact / f64::from(cluster.area);
+    let got = reflect(s, &weights, |i| values[i], |_, light| light, &ON)[0].as_dvec3();
     assert!((got / expected - 1.0).abs().max_element() < 1e-5, "{got}, not {expected}");
 
     let choices: f64 = camera.arrivals.iter().map(|a| f64::from(a.survival)).sum();
-    let expected = choices * f64::from(camera.outgoing[0].pdf);
+    let expected = choices * f64::from(camera.outgoing.pdf(0));
     let got = f64::from(weights.densities[clusters.place[0] as usize].camera);
     assert!((got / expected - 1.0).abs() < 1e-5, "{got}, not {expected}");
 }

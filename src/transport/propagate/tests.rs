@@ -25,7 +25,7 @@ fn no_surface_and_no_cluster_makes_the_sweeps_diverge() {
             let s =
                 Sampled { world: &world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
             assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
-            let solved = Reflected { segments: segments(s, &weights), ..Reflected::default() };
+            let solved = Reflected { segments: Segments::new(s, &weights), ..Reflected::default() };
             let [radius, peak] = solved.growth(s, &weights, 200, &ON);
             println!("{wall}, {camera_paths} and {light_paths} paths: radius {radius:.4}, peak {peak:.3}");
             assert!(radius < 1.0 && peak.is_finite(), "{wall}: {radius} {peak}");

@@ -77,13 +77,13 @@ fn path(world: &World, number: u32) -> Option<Vec<Point>> {
 }
 
 fn add_camera(store: &mut CameraStore, points: &[Point]) {
-    for (k, p) in points.iter().enumerate() {
-        store.arrivals.push(p.camera);
-        store.inverse_n2.push(1.0);
-        let forward = if k + 1 < points.len() { p.outgoing.forward } else { 0.0 };
-        store.outgoing.push(Outgoing { forward, ..p.outgoing });
-        store.next_events.push(NextEvent::default());
-    }
+    points.iter().for_each(|p| store.push(p.camera, 1.0, NextEvent::default(), p.outgoing));
+}
+
+fn add_path(store: &mut CameraStore, points: &[Point]) {
+    let (last, before) = points.split_last().unwrap();
+    add_camera(store, before);
+    store.push(last.camera, 1.0, NextEvent::default(), Outgoing { forward: 0.0, ..last.outgoing });
 }
 
 fn add_light(store: &mut LightStore, points: &[Point]) {
@@ -104,21 +104,21 @@ enum Technique {
 fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Technique) -> f32 {
     let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
     let half = others.len() / 2;
-    others[..half].iter().for_each(|p| add_camera(&mut camera, p));
+    others[..half].iter().for_each(|p| add_path(&mut camera, p));
     others[half..].iter().for_each(|p| add_light(&mut light, p));
     let (start, photons) = (camera.arrivals.len(), light.arrivals.len());
     let joined = match technique {
         Technique::Join(m) => m,
         Technique::Hit | Technique::NextEvent => ARRIVALS,
     };
-    add_camera(&mut camera, &points[..joined]);
+    add_camera(&mut camera, &points[..joined - 1]);
     let last = start + joined - 1;
-    let Outgoing { direction, pdf, .. } = camera.outgoing[last];
+    let end = &points[joined - 1];
+    let (mut arrival, mut next_event) = (end.camera, NextEvent::default());
+    arrival.goes_on = matches!(technique, Technique::Hit);
+    let Outgoing { direction, pdf, .. } = end.outgoing;
     match technique {
-        Technique::Join(m) => {
-            camera.arrivals[last].goes_on = false;
-            add_light(&mut light, &points[m - 1..]);
-        }
+        Technique::Join(m) => add_light(&mut light, &points[m - 1..]),
         Technique::Hit => camera.hits.push(EmissionHit {
             arrival: last as u32,
             light: Vec3::ONE,
@@ -128,8 +128,7 @@ fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Tec
             passages: 0,
         }),
         Technique::NextEvent => {
-            camera.arrivals[last].goes_on = false;
-            camera.next_events[last] = NextEvent {
+            next_event = NextEvent {
                 direction,
                 pdf,
                 light: Vec3::ONE,
@@ -139,15 +138,15 @@ fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Tec
             };
         }
     }
+    camera.push(arrival, 1.0, next_event, Outgoing { forward: 0.0, ..end.outgoing });
     // measured areas are a little different with every arrival that comes to a cluster
     let (clusters, mut weights) = (clustered(world, &camera, &light, Areas::None), Weights::default());
     let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
     assert!(weights.weigh(s, Estimator::WholePath, &ON));
-    let segments = segments(s, &weights);
-    let paths = WholePaths { s, w: &weights, segments: &segments, rests: rests(s, &weights) };
+    let paths = WholePaths { s, w: &weights, rests: rests(s, &weights) };
     let mut at = Prefix { throughput: Vec3::ONE, bounces: 0, is_first: true, back: 0.0 };
     for i in start..last {
-        let near = paths.near(i, &at, camera.outgoing[i].direction);
+        let near = paths.near(i, &at, camera.outgoing.get(i).direction);
         at = paths.beyond(i, &at, near);
     }
     match technique {
@@ -157,8 +156,10 @@ fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Tec
             assert_eq!(j - photons, ARRIVALS - joined);
             paths.join_weight(j, &at, paths.joined_near(last, &at))
         }
-        Technique::Hit => paths.hit_weight(&camera.hits[0], paths.near(last, &at, direction)),
-        Technique::NextEvent => paths.next_event_weight(last, &at),
+        Technique::Hit => {
+            paths.hit_weight(&camera.hits.of(last).next().unwrap(), paths.near(last, &at, direction))
+        }
+        Technique::NextEvent => paths.next_event_weight(last, &next_event, &at),
     }
 }
 

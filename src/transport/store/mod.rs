@@ -4,10 +4,24 @@
 //! goes on in the next arrival of the same array, if it goes on. Directions are unit vectors in scene space and
 //! point away from the surface; densities are per projected solid angle about the geometric normal; radiance
 //! is basic radiance `L / n^2`, with the camera in a medium of index one.
+//!
+//! What is kept is packed: directions to within 7e-5 rad, colours to within 1.2e-4 of their largest component. All techniques
+//! look at the same rounded directions, so their densities agree.
 
+mod arrivals;
+mod hits;
+mod leaving;
+mod photons;
+
+pub use arrivals::{Arrivals, storable_survival};
+pub use hits::Hits;
+pub use leaving::{NextEvents, Outgoings};
+pub use photons::Photons;
+
+use super::sparse::Sparse;
 use crate::shading::bsdf::Bsdf;
 use crate::shading::emitters::Draw;
-use crate::shading::{Address, SurfaceClass, World};
+use crate::shading::{Address, SurfaceClass, SurfacePoint, World};
 use glam::Vec3;
 
 /// The end of a segment, from the camera or from a light.
@@ -17,15 +31,15 @@ pub struct Arrival {
     pub position: Vec3,
     /// Shading normal of the mesh, on the side arrived from unless the surface transmits: what it is clustered by.
     pub normal: Vec3,
-    /// Direction back along the segment.
+    /// Direction back along the segment; of a diffuse surface, as kept, its normal: it looks the same from there.
     pub wo: Vec3,
-    /// The surface.
+    /// The surface; see [`Arrival::surface`].
     pub at: Address,
     /// Reflectance, of a diffuse surface.
     pub reflectance: Vec3,
     /// Of a diffuse surface: density with which its lobe draws `wo`.
     pub back_pdf: f32,
-    /// Probability `q` that Russian roulette lets the path go on.
+    /// Probability `q` that Russian roulette lets the path go on, as [`storable_survival`] has it.
     pub survival: f32,
     /// How it may share light with its neighbours.
     pub class: SurfaceClass,
@@ -41,12 +55,20 @@ impl Arrival {
 
     /// The same, looked at from elsewhere.
     pub fn bsdf_from(&self, world: &World, wo: Vec3) -> Bsdf {
-        world.bsdf(&world.surface(&self.at), wo)
+        world.bsdf(&self.surface(world), wo)
+    }
+
+    /// The surface there. Barycentrics of diffuse ones are not kept: they follow from the position.
+    pub fn surface(&self, world: &World) -> SurfacePoint {
+        match self.class {
+            SurfaceClass::Diffuse => world.surface_near(&self.at, self.position),
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => world.surface(&self.at),
+        }
     }
 }
 
 /// The segment that leaves an arrival of a camera path.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outgoing {
     /// Direction in which it leaves.
     pub direction: Vec3,
@@ -64,8 +86,21 @@ pub struct Outgoing {
     pub passages: u32,
 }
 
+impl Outgoing {
+    /// One with nothing on its way, between surfaces that it is sure to leave and to end at.
+    pub(super) const PLAIN: Self = Self {
+        direction: Vec3::ZERO,
+        pdf: 0.0,
+        throughput: Vec3::ONE,
+        forward: 1.0,
+        reverse: 1.0,
+        squeeze: 1.0,
+        passages: 0,
+    };
+}
+
 /// The next-event segment of an arrival of a camera path.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NextEvent {
     /// Direction to the light.
     pub direction: Vec3,
@@ -127,7 +162,7 @@ pub struct Photon {
 }
 
 /// The techniques beside the light path itself that could have made a photon's last segment.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rivals {
     /// Of a first segment: it was made with `light_density` (as in [`NextEvent`]).
     First {
@@ -156,30 +191,30 @@ pub struct Carry {
     pub inverse_n2: f32,
 }
 
-/// The camera's side of an iteration. All but `hits` have one element for every arrival.
-#[derive(Debug, Default)]
+/// The camera's side of an iteration. All but `hits` have one place for every arrival.
+#[derive(Clone, Debug, Default)]
 pub struct CameraStore {
     /// Ends of segments, path by path.
-    pub arrivals: Vec<Arrival>,
-    /// `1 / n^2` on the side arrived from.
-    pub inverse_n2: Vec<f32>,
+    pub arrivals: Arrivals,
     /// Segments that leave them.
-    pub outgoing: Vec<Outgoing>,
+    pub outgoing: Outgoings,
     /// Next-event segments.
-    pub next_events: Vec<NextEvent>,
+    pub next_events: NextEvents,
     /// Light met by segments that left an arrival, in their order.
-    pub hits: Vec<EmissionHit>,
+    pub hits: Hits,
     /// Contributions that were not finite and were dropped.
     pub dropped: u64,
+    /// See [`CameraStore::inverse_n2`]; where it is not one.
+    inverse_n2: Sparse<f32>,
 }
 
 /// The lights' side of an iteration.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct LightStore {
     /// Ends of segments, path by path.
-    pub arrivals: Vec<Arrival>,
+    pub arrivals: Arrivals,
     /// What they carry.
-    pub photons: Vec<Photon>,
+    pub photons: Photons,
     /// One for every path that arrived somewhere.
     pub starts: Vec<LightStart>,
     /// One for every arrival; empty unless the literal recursion asked for it.
@@ -191,32 +226,54 @@ fn bytes<T>(v: &Vec<T>) -> usize {
 }
 
 impl CameraStore {
+    /// Adds an arrival, `1 / n^2` on the side arrived from, its next-event segment and the one that leaves it.
+    pub fn push(&mut self, a: Arrival, inverse_n2: f32, next_event: NextEvent, outgoing: Outgoing) {
+        self.arrivals.push(a);
+        self.inverse_n2.push((inverse_n2 != 1.0).then_some(inverse_n2));
+        self.next_events.push(next_event);
+        self.outgoing.push(outgoing);
+    }
+
+    /// `1 / n^2` on the side from which arrival `i` was arrived at.
+    #[inline]
+    pub fn inverse_n2(&self, i: usize) -> f32 {
+        self.inverse_n2.get(i).copied().unwrap_or(1.0)
+    }
+
     /// Segments: those that leave arrivals, next-event segments, and one primary segment a path.
     pub fn segments(&self, paths: usize) -> usize {
-        let leaving = self.arrivals.iter().filter(|a| a.goes_on).count();
-        let direct = self.next_events.iter().filter(|n| n.next_event_pdf > 0.0).count();
-        paths + leaving + direct
+        paths + self.outgoing.count() + self.next_events.count()
     }
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        bytes(&self.arrivals)
-            + bytes(&self.inverse_n2)
-            + bytes(&self.outgoing)
-            + bytes(&self.next_events)
-            + bytes(&self.hits)
+        self.arrivals.bytes()
+            + self.inverse_n2.bytes()
+            + self.outgoing.bytes()
+            + self.next_events.bytes()
+            + self.hits.bytes()
+    }
+
+    /// Makes room for the paths of all these stores, too, and no more.
+    pub fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
+        let arrivals = parts.clone().map(|p| p.arrivals.len()).sum();
+        self.arrivals.reserve(arrivals);
+        self.inverse_n2.reserve(arrivals, parts.clone().map(|p| p.inverse_n2.count()).sum());
+        self.outgoing.reserve(parts.clone().map(|p| &p.outgoing));
+        self.next_events.reserve(parts.clone().map(|p| &p.next_events));
+        self.hits.reserve(arrivals, parts.map(|p| p.hits.len()).sum());
     }
 
     /// Appends the paths of another store; the first of its arrivals gets the number that is returned.
     pub fn append(&mut self, other: &mut Self) -> u32 {
-        let first = self.arrivals.len() as u32;
+        let first = self.arrivals.len();
         self.arrivals.append(&mut other.arrivals);
         self.inverse_n2.append(&mut other.inverse_n2);
         self.outgoing.append(&mut other.outgoing);
         self.next_events.append(&mut other.next_events);
+        self.hits.append(&mut other.hits, first);
         self.dropped += other.dropped;
-        self.hits.extend(other.hits.drain(..).map(|h| EmissionHit { arrival: h.arrival + first, ..h }));
-        first
+        first as u32
     }
 
     /// Empties the store and keeps its memory.
@@ -233,7 +290,16 @@ impl CameraStore {
 impl LightStore {
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        bytes(&self.arrivals) + bytes(&self.photons) + bytes(&self.starts) + bytes(&self.carries)
+        self.arrivals.bytes() + self.photons.bytes() + bytes(&self.starts) + bytes(&self.carries)
+    }
+
+    /// Makes room for the paths of all these stores, too, and no more.
+    pub fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
+        let arrivals = parts.clone().map(|p| p.arrivals.len()).sum();
+        self.arrivals.reserve(arrivals);
+        self.photons.reserve(arrivals);
+        self.starts.reserve_exact(parts.clone().map(|p| p.starts.len()).sum());
+        self.carries.reserve_exact(parts.map(|p| p.carries.len()).sum());
     }
 
     /// Appends the paths of another store.
