@@ -20,15 +20,19 @@ from two_references import SHARP, relative, relative_error
 ROOT = Path(__file__).parent.parent
 KEPT = ROOT / "results" / "honesty"
 RESOLUTION, THREADS = [192, 108], 1
-SECONDS = (2, 8, 32)
+SECONDS = (3, 10, 30)
 SEEDS = 2
-REFERENCE_SECONDS = float(os.environ.get("SEGUE_SECONDS", "60"))
-#: Least share of renders whose told error is within a factor of two.
+REFERENCE_SECONDS = float(os.environ.get("SEGUE_SECONDS", "120"))
+#: Where single segments find too little light for a kernel of a third of a pixel, and times as many seconds.
+COARSER: dict[str, tuple[dict[str, object], float]] = {
+    "door_ajar": ({"kernel_size": 1.0}, 2.5)
+}
+#: Least share of scenes and times whose told error is within a factor of two.
 WANTED = 0.9
 HEADING = "How true the told error is"
 HEAD = f"""relMSE that `segment` tells of its picture over the true one, by `benches/honesty.py`: {RESOLUTION[0]} × {RESOLUTION[1]}, {THREADS} thread, {SEEDS} seeds.
 Each true squared error is the product of the differences from two independent references, {REFERENCE_SECONDS:g} s each with a fixed kernel of a
-third of a pixel; *systematic* is what two seeds have in common, the rest is noise.
+third of a pixel (door_ajar: of one pixel, {2.5 * REFERENCE_SECONDS:g} s); *systematic* is what two seeds have in common, the rest is noise.
 
 | scene | seconds | true | systematic | told | told systematic | told over true |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: |
@@ -44,31 +48,40 @@ class Told:
     bias: float
 
 
+#: What stands for an error of fewer than four iterations, of which nothing is told.
+NOTHING = float("nan")
+
+
 def render(scene: Scene, **settings: object) -> Told:
     """A render and what it says."""
     job = Render(scene, {"resolution": RESOLUTION, "threads": THREADS, **settings})
     job.run()
     stats = job.stats()
     picture = job.read_pass("Combined")[..., :3].astype(np.float64)
-    return Told(picture, stats["estimated_error"], stats["estimated_bias"] or 0.0)
+    error = stats["estimated_error"]
+    return Told(
+        picture, NOTHING if error is None else error, stats["estimated_bias"] or 0.0
+    )
 
 
 def references(name: str, scene: Scene) -> list[np.ndarray]:
     """Two pictures whose noise is independent."""
     found = []
+    settings, times = COARSER.get(name, ({}, 1.0))
+    seconds = times * REFERENCE_SECONDS
     for k in range(2):
-        path = KEPT / f"{name}-{RESOLUTION[0]}-{REFERENCE_SECONDS:g}s-{k}.exr"
+        path = KEPT / f"{name}-{RESOLUTION[0]}-{seconds:g}s-{k}.exr"
         if not path.exists():
             KEPT.mkdir(parents=True, exist_ok=True)
-            sharp = {**SHARP, "seed": SHARP["seed"] + k}
-            picture = render(scene, time=REFERENCE_SECONDS, **sharp).picture
+            sharp = {**SHARP, **settings, "seed": SHARP["seed"] + k}
+            picture = render(scene, time=seconds, **sharp).picture
             images.write_exr(path, {"Combined": picture}, {})
         found.append(images.read_rgb(path).astype(np.float64))
     return found
 
 
 def measure(name: str) -> tuple[list[str], list[float]]:
-    """Rows of a scene, and told over true of every render."""
+    """Rows of a scene, and told over true in the mean of the seeds, for every time at which something is told."""
     scene = usd.load(ROOT / "scenes" / f"{name}.usda").scene
     first, second = references(name, scene)
     rows, ratios = [], []
@@ -78,7 +91,11 @@ def measure(name: str) -> tuple[list[str], list[float]]:
         common = (told[0].picture - first) * (told[1].picture - second)
         both = relative(common, (first + second) / 2)
         within = [t.error / e for t, e in zip(told, true, strict=True)]
-        ratios += within
+        known = [k for k, t in enumerate(told) if not np.isnan(t.error)]
+        if known:
+            means = [np.mean([told[k].error for k in known])]
+            means.append(np.mean([true[k] for k in known]))
+            ratios.append(means[0] / means[1])
         cells = [np.mean(true), both, *np.mean([(t.error, t.bias) for t in told], 0)]
         shown = " | ".join(f"{c:.2g}" for c in cells)
         each = ", ".join(f"{r:.2f}" for r in within)
@@ -95,7 +112,7 @@ def main(names: list[str]) -> int:
         rows += more_rows
         ratios += more_ratios
     share = np.mean([0.5 <= r <= 2.0 for r in ratios])
-    tail = f"\n\nWithin a factor of two: {share:.0%} of {len(ratios)} renders."
+    tail = f"\n\nWithin a factor of two in the mean of the seeds: {share:.0%} of {len(ratios)} scenes and times."
     print(tail.strip())
     if not names:
         replace_section(

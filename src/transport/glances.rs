@@ -14,7 +14,9 @@ use crate::math::luminance;
 use glam::Vec3;
 
 /// Most glances of a pixel in an iteration.
-pub const MOST: u32 = 16;
+pub const MOST: u32 = 256;
+/// Most that all of them may cost, as a share of what the rest of an iteration does: the rest of the picture counts, too.
+const MOST_COST: f64 = 0.5;
 /// What an iteration costs over its rays.
 const OVER_RAYS: f64 = 2.0;
 /// Share of that cost that goes to blocks with Dirac chains from the first, and most glances for it: what has not been met
@@ -123,12 +125,17 @@ impl Glances {
         let has_chains = |b: usize| of_glance(b) > CHAINS * f64::from(pixels[b]);
         let chains = (0..rest.len()).filter(|&b| has_chains(b)).map(of_glance).sum::<f64>();
         let advance = (1.0 + IN_ADVANCE * cost / chains).min(MOST_IN_ADVANCE);
-        let number = |b: usize| {
-            let best = (on_segment[b] / scale(b) * cost / (other * of_glance(b))).sqrt();
-            // what is NaN, for nothing is seen or known, is the lesser
-            best.max(if has_chains(b) { advance } else { 1.0 }).clamp(1.0, f64::from(MOST)) as u32
-        };
-        self.numbers = (0..rest.len()).map(number).collect();
+        let more: Vec<f64> = (0..rest.len())
+            .map(|b| {
+                let best = (on_segment[b] / scale(b) * cost / (other * of_glance(b))).sqrt();
+                // what is NaN, for nothing is seen or known, is the lesser
+                best.max(if has_chains(b) { advance } else { 1.0 }).min(f64::from(MOST)) - 1.0
+            })
+            .collect();
+        let total = more.iter().enumerate().map(|(b, more)| more * of_glance(b)).sum::<f64>();
+        let affordable = (MOST_COST * cost / total).min(1.0);
+        let number = |more: &f64| (1.0 + affordable * more) as u32;
+        self.numbers = more.iter().map(number).collect();
     }
 
     /// Memory, bytes.
@@ -181,7 +188,10 @@ mod tests {
     #[test]
     fn more_glances_where_light_comes_and_goes() {
         assert_eq!(chosen(1, 100.0), [5, 5, 1]);
-        assert_eq!(chosen(16, 1000.0), [MOST, 5, 1]);
+        // as many as half of the rest's cost allows: 28 rays in three blocks, a glance takes 2 in one
+        let [most, steady, none] = chosen(16, 1000.0);
+        assert!((40..=43).contains(&most), "{most}");
+        assert_eq!([steady, none], [1, 1]);
         let [some, steady, none] = chosen(64, 4.0);
         assert!((6..MOST).contains(&some), "{some}");
         assert_eq!([steady, none], [5, 1]);

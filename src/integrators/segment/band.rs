@@ -1,0 +1,337 @@
+//! A band of the picture in one iteration, from its samples to the film.
+
+use super::learning::{Learnt, is_reported};
+use crate::film::{FirstHit, Pass, Rect, Sample, SplatBuffer};
+use crate::integrators::{Context, StageCosts, locked};
+use crate::math::Sampler;
+use crate::math::sampler::hash;
+use crate::shading::World;
+use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
+use crate::transport::camera::{CameraSampler, Primary};
+use crate::transport::cluster::{Areas, Clusters, Numbered};
+use crate::transport::glances;
+use crate::transport::grid::Grid;
+use crate::transport::light::LightSampler;
+use crate::transport::propagate::Reflected;
+use crate::transport::store::{CameraStore, LightStore};
+use crate::transport::weigh::{Sampled, Weights};
+use crate::transport::{Cut, Estimator, Techniques};
+use glam::Vec3;
+use std::mem::take;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Keeps the random numbers of light paths apart from those of pixels.
+const LIGHT_STREAM: u32 = 0x11e4_7000;
+/// Keeps those of the grids apart from both.
+const GRID_STREAM: u32 = 0x961d_0000;
+/// Keeps those of bridges apart.
+const BRIDGE_STREAM: u32 = 0xb21d_9e00;
+
+/// What is sampled of a band, how it is clustered, and what comes of it. The light paths are those of all bands.
+#[derive(Debug, Default)]
+pub(super) struct Band {
+    techniques: Techniques,
+    camera: CameraStore,
+    pub light: LightStore,
+    clusters: Clusters,
+    bridges: Bridges,
+    splats: SplatBuffer,
+    pub weights: Weights,
+    pub reflected: Reflected,
+    /// What every pixel sees, row by row.
+    pub primaries: Vec<Primary>,
+    /// The first surface that every pixel sees, if a pass asks for it.
+    first_hits: Vec<Option<FirstHit>>,
+    /// For every pixel, the size of the voxel in which it is filtered, octaves over the kernel's.
+    octaves: Vec<f32>,
+    /// First arrival of every camera path that has one.
+    starts: Vec<u32>,
+    /// How much of the light is beyond the camera's own paths, see [`Reflected::beyond_own_paths`]; only in iterations that are reported.
+    pub beyond: f64,
+}
+
+impl Band {
+    /// Of nothing yet.
+    pub fn new(techniques: Techniques) -> Self {
+        Self { techniques, ..Self::default() }
+    }
+
+    /// What was sampled, with the scene.
+    pub fn sampled<'a>(&'a self, world: &'a World) -> Sampled<'a> {
+        let bridges = self.techniques.bridges.map(|_| &self.bridges);
+        Sampled { world, camera: &self.camera, light: &self.light, clusters: &self.clusters, bridges }
+    }
+
+    /// Basic radiance that is reflected at the end of a primary segment.
+    pub fn seen(&self, sampled: Sampled, primary: &Primary) -> Vec3 {
+        primary.arrival.map_or(Vec3::ZERO, |a| self.reflected.towards_camera(sampled, a as usize))
+    }
+
+    /// All stages up to the film. Returns `false` if it was stopped.
+    pub fn transport(
+        &mut self,
+        context: &Context,
+        learnt: &Learnt,
+        index: u32,
+        light_paths: f32,
+        cut: &Cut,
+        costs: &mut StageCosts,
+    ) -> bool {
+        let Context { world, sensor, .. } = *context;
+        self.forget();
+        self.beyond = 0.0;
+        if !self.sample_camera(context, learnt, index, light_paths, cut) {
+            return false;
+        }
+        costs.stage("sampling", self.camera.bytes() + self.light.bytes());
+
+        let edge = self.techniques.kernel.edge(context.completed);
+        let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index))
+            .with_sizes(learnt.adaptation.sizes());
+        let all = Numbered { camera: &self.camera.arrivals, light: &self.light.arrivals };
+        // bridges may begin at any light arrival; the other estimators follow light paths to their ends
+        let needs_all = context.keep_all
+            || self.techniques.estimator != Estimator::LeaveOneOut
+            || self.techniques.bridges.is_some();
+        let clusters = &mut self.clusters;
+        let is_done = match needs_all {
+            true => clusters.group(world, &grid, all, cut),
+            false => clusters.group_seen(world, &grid, all, cut),
+        };
+        if !is_done {
+            return false;
+        }
+        let clusters = &self.clusters;
+        costs.hold(self.held() + clusters.most_bytes() - clusters.bytes());
+        costs.stage("clustering", clusters.bytes());
+        let areas = match self.techniques.estimator {
+            _ if light_paths == 0.0 => Areas::None,
+            Estimator::LeaveOneOut | Estimator::WholePath => Areas::OfPhotons,
+            Estimator::Literal => Areas::True,
+        };
+        if !self.clusters.measure(world, &grid, all, areas, cut) {
+            return false;
+        }
+        costs.stage("areas", 0);
+        self.octaves.clear();
+        self.octaves.extend(self.primaries.iter().map(|p| match p.arrival {
+            Some(a) => grid.octaves(self.camera.arrivals.position(a as usize)),
+            None => 0.0,
+        }));
+        context.counters.segments.fetch_max(self.segments() as u64, Relaxed);
+
+        if let Some(choice) = self.techniques.bridges {
+            if !self.sample_bridges(context, index, choice, cut) {
+                return false;
+            }
+            costs.stage("bridges", self.bridges.bytes() + self.splats.bytes());
+        }
+        let mut weights = take(&mut self.weights);
+        let is_done = weights.weigh(self.sampled(context.world), self.techniques.estimator, cut);
+        self.weights = weights;
+        if !is_done {
+            return false;
+        }
+        costs.hold(self.held());
+        costs.stage("weights", self.weights.bytes());
+        let passes = context.film.passes();
+        let wants_direct = passes.contains(Pass::Direct) || passes.contains(Pass::Indirect);
+        let first = || {
+            let first = self.primaries.iter().filter_map(|p| Some((p.arrival?, p.passages)));
+            first
+                .filter(|&(_, passages)| context.max_depth.is_none_or(|most| passages < most))
+                .collect::<Vec<_>>()
+        };
+        let mut reflected = take(&mut self.reflected);
+        let (sampled, weights) = (self.sampled(world), &self.weights);
+        let solved = match (self.techniques.estimator, context.max_depth) {
+            (Estimator::Literal, limit) => reflected.solve_literal(sampled, weights, &first(), limit, cut),
+            (Estimator::WholePath, limit) => {
+                reflected.solve_whole_paths(sampled, weights, &first(), limit, cut)
+            }
+            (Estimator::LeaveOneOut, None) => {
+                reflected.solve(sampled, weights, &self.starts, wants_direct, cut)
+            }
+            (Estimator::LeaveOneOut, Some(limit)) => {
+                reflected.solve_limited(sampled, weights, &first(), limit, cut)
+            }
+        };
+        self.reflected = reflected;
+        costs.hold(self.held() + self.reflected.most_bytes() - self.reflected.bytes());
+        costs.stage("propagation", self.reflected.bytes());
+        context.counters.dropped.fetch_add(self.camera.dropped, Relaxed);
+        if solved && is_reported(index) {
+            let sweeps = match (self.techniques.estimator, context.max_depth) {
+                (Estimator::LeaveOneOut, None) => context.operator_sweeps,
+                _ => 0,
+            };
+            let sampled = self.sampled(world);
+            let report = self.reflected.report(sampled, &self.weights, &self.starts, sweeps, cut);
+            *locked(&context.counters.graph) = Some(report);
+            let mut beyond = 0.0;
+            if self.techniques.camera_paths {
+                beyond = self.reflected.beyond_own_paths(sampled, &self.weights, &self.starts, cut);
+            }
+            self.beyond = beyond;
+            costs.stage("report", 0);
+        }
+        solved
+    }
+
+    fn sample_camera(
+        &mut self,
+        context: &Context,
+        learnt: &Learnt,
+        index: u32,
+        light_paths: f32,
+        cut: &Cut,
+    ) -> bool {
+        let sampler = CameraSampler {
+            world: context.world,
+            sensor: context.sensor,
+            guide: &learnt.guiding.guide,
+            light_paths,
+            transparent_background: context.transparent_background,
+            max_depth: context.max_depth,
+            next_event: self.techniques.next_event,
+            goes_on: self.techniques.camera_paths,
+        };
+        let wants_first_hits = context.film.passes().iter().any(Pass::is_first_hit);
+        let path = |x: u32, y: u32, (store, seen): &mut (CameraStore, Vec<_>), rays: &mut u64| {
+            let (ray, mut random) = context.camera_sample(x, y, index);
+            let (mut primary, first_hit) = sampler.path(&ray, &mut random, store, rays);
+            let more = 1..learnt.glances.number(x + context.crop.x, y + context.crop.y);
+            if !more.is_empty() {
+                primary.average(more.map(|k| {
+                    let (ray, mut random) = context.further_camera_sample(x, y, index, k, glances::MOST);
+                    sampler.glance(&ray, &mut random, rays)
+                }));
+            }
+            seen.push((primary, first_hit));
+        };
+        self.camera.clear();
+        self.primaries.clear();
+        self.first_hits.clear();
+        self.starts.clear();
+        let pixels = context.crop.area();
+        self.primaries.reserve_exact(pixels);
+        self.starts.reserve_exact(pixels);
+        self.first_hits.reserve_exact(if wants_first_hits { pixels } else { 0 });
+        let camera = &mut self.camera;
+        context.camera_rows(path, |rows| {
+            camera.reserve(rows.iter().map(|r| &r.0));
+            for (mut store, seen) in rows {
+                let first = camera.append(&mut store);
+                for (mut p, first_hit) in seen {
+                    p.arrival = p.arrival.map(|a| a + first);
+                    self.starts.extend(p.arrival);
+                    self.primaries.push(p);
+                    self.first_hits.extend(wants_first_hits.then_some(first_hit));
+                }
+            }
+        });
+        !cut.is_raised()
+    }
+
+    /// So many light paths, for all bands. Returns `false` if it was stopped.
+    pub fn sample_light(
+        &mut self,
+        context: &Context,
+        learnt: &Learnt,
+        index: u32,
+        paths: u32,
+        cut: &Cut,
+    ) -> bool {
+        self.forget();
+        let sampler = LightSampler {
+            world: context.world,
+            guide: &learnt.guiding.guide,
+            paths: paths as f32,
+            next_event: self.techniques.next_event,
+            estimator: self.techniques.estimator,
+        };
+        let path = |k: u32, store: &mut LightStore, rays: &mut u64| {
+            // Leaving one out takes light paths to be independent of each other. Stratified among each other, those of
+            // an iteration are not: given one photon, fewer others lie nearby. They are from iteration to iteration.
+            sampler.path(k, &mut Sampler::new(context.seed ^ LIGHT_STREAM, k, index), store, rays);
+        };
+        let light = &mut self.light;
+        light.clear();
+        context.light_batches(paths, path, |batches| {
+            light.reserve(batches.iter());
+            batches.into_iter().for_each(|mut store| light.append(&mut store));
+        });
+        !cut.is_raised()
+    }
+
+    /// Bridges between what was sampled and clustered, and what they send to the lens.
+    fn sample_bridges(&mut self, context: &Context, index: u32, choice: Choice, cut: &Cut) -> bool {
+        let Context { world, sensor, filter, crop, max_depth, .. } = *context;
+        let mut bridges = take(&mut self.bridges);
+        let sampled = Sampled { bridges: None, ..self.sampled(world) };
+        let mut seen = vec![0.0; sampled.camera.arrivals.len()];
+        for p in self.primaries.iter().filter(|p| p.passages == 0) {
+            if let Some(a) = p.arrival {
+                seen[a as usize] = p.density;
+            }
+        }
+        let seed = context.seed ^ BRIDGE_STREAM;
+        let sampler = BridgeSampler { sampled, sensor, choice, seed, index, filter, crop, max_depth };
+        let mut rays = 0;
+        let is_done = bridges.sample(&sampler, seen, &mut rays, cut);
+        self.bridges = bridges;
+        context.counters.rays.fetch_add(rays, Relaxed);
+        self.splats.collect(&self.bridges.splats, filter, crop);
+        is_done
+    }
+
+    /// Gives back what the last one was weighed and solved with.
+    fn forget(&mut self) {
+        (self.clusters, self.weights, self.reflected) = Default::default();
+    }
+
+    /// What is held of the iteration now, bytes.
+    pub fn held(&self) -> usize {
+        self.camera.bytes()
+            + self.light.bytes()
+            + self.clusters.bytes()
+            + self.bridges.bytes()
+            + self.splats.bytes()
+            + self.weights.bytes()
+            + self.reflected.bytes()
+            + self.primaries.capacity() * size_of::<Primary>()
+            + self.first_hits.capacity() * size_of::<Option<FirstHit>>()
+            + (self.starts.capacity() + self.octaves.capacity()) * size_of::<f32>()
+    }
+
+    /// Segments of this band.
+    fn segments(&self) -> usize {
+        self.camera.segments(self.primaries.len()) + self.light.arrivals.len()
+    }
+
+    /// One sample for every pixel; `band` is its place on the film.
+    pub fn gather(&self, context: &Context, band: Rect) {
+        let sampled = self.sampled(context.world);
+        context.film.add_to_band(band, |x, y| {
+            let pixel = band.index(x, y);
+            let (p, splatted) = (&self.primaries[pixel], self.splats.get(pixel));
+            let (reflected, direct) = match p.arrival.map(|a| a as usize) {
+                Some(a) => {
+                    let direct = self.reflected.direct.get(a).filter(|_| p.passages == 0);
+                    (self.reflected.towards_camera(sampled, a), direct.map_or(Vec3::ZERO, |d| d.decode()))
+                }
+                None => (Vec3::ZERO, Vec3::ZERO),
+            };
+            Sample {
+                radiance: p.light + p.weight * reflected + splatted.light,
+                unfiltered: self.techniques.camera_paths.then(|| p.light + p.weight * p.unfiltered),
+                kernel_octaves: Some(self.octaves[pixel]),
+                alpha: p.alpha,
+                emission: p.emission,
+                direct: p.mirrored + p.weight * direct.min(reflected) + splatted.direct,
+                first_hit: self.first_hits.get(pixel).copied().flatten(),
+            }
+        });
+        (context.tile_done)(band);
+    }
+}

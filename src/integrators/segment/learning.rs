@@ -1,0 +1,218 @@
+//! What iterations teach later ones: where light paths begin and how many pay, the kernel's sizes, how often pixels look for
+//! lights. Everything rests on earlier iterations alone.
+
+use super::band::Band;
+use crate::film::Rect;
+use crate::integrators::shown::Shown;
+use crate::integrators::{Context, StageCosts, locked};
+use crate::math::sampler::hash;
+use crate::math::{LUMINANCE, luminance};
+use crate::transport::adaptation::{Adaptation, Look};
+use crate::transport::camera::Primary;
+use crate::transport::economy::{Departure, Economy};
+use crate::transport::glances::Glances;
+use crate::transport::guiding::{Guiding, Outcome, Start};
+use crate::transport::{Cut, Techniques};
+use glam::Vec3;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Keeps the random numbers of the grids that choose sizes apart from all others.
+const ADAPTATION_STREAM: u32 = 0xada9_0000;
+
+/// What is kept from one iteration to the next.
+#[derive(Debug, Default)]
+pub(super) struct Learnt {
+    /// Where light paths begin.
+    pub guiding: Guiding,
+    /// The kernel's size place by place.
+    pub adaptation: Adaptation,
+    /// How often pixels look for light on their primary segments.
+    pub glances: Glances,
+    /// How many light paths pay.
+    economy: Economy,
+    /// For every band, the picture before the last iteration that looked whether they do.
+    yardsticks: Vec<Shown>,
+}
+
+/// What is found out about an iteration while its bands are made.
+pub(super) struct Lessons {
+    techniques: Techniques,
+    /// Its number.
+    index: u32,
+    /// Whether light paths learn from it where to begin.
+    guides: bool,
+    /// Whether it tells how many of them pay.
+    looks: bool,
+    /// Whether its picture is compared with those before.
+    compares: bool,
+    /// Its light paths, and the bands that share them.
+    light_paths: f32,
+    bands: usize,
+    /// Rays that were traced before it.
+    rays_before: u64,
+    /// How far its picture is from those before.
+    deviation: f64,
+    /// Sum of what bands have beyond the camera's own paths.
+    beyond: f64,
+}
+
+impl Learnt {
+    /// How many of so many light paths an iteration samples.
+    pub fn light_paths(&self, context: &Context, techniques: &Techniques, all: f32, index: u32) -> f32 {
+        if is_thrifty(context, techniques) { self.economy.light_paths(all, index) } else { all }
+    }
+
+    /// Begins an iteration whose light paths are sampled: so many, of which `arrived` arrived somewhere. `rays_before`: traced
+    /// before it.
+    pub fn begin(
+        &mut self,
+        context: &Context,
+        techniques: Techniques,
+        index: u32,
+        (light_paths, arrived): (f32, usize),
+        (bands, rays_before): (usize, u64),
+    ) -> Lessons {
+        let is_thrifty = is_thrifty(context, &techniques);
+        let guides = techniques.emission_guiding && self.guiding.begin_iteration(arrived);
+        let looks = is_thrifty && Economy::looks(index);
+        let compares = is_thrifty && self.economy.compares(index);
+        if looks {
+            self.yardsticks.clear();
+        }
+        if techniques.kernel.adapts() {
+            self.adaptation.begin(context.crop, context.completed + 1);
+        }
+        self.glances.begin(context.crop, context.world.needs().mirrors);
+        Lessons {
+            techniques,
+            index,
+            guides,
+            looks,
+            compares,
+            light_paths,
+            bands,
+            rays_before,
+            deviation: 0.0,
+            beyond: 0.0,
+        }
+    }
+
+    /// Takes in band number `k`, which is in the film at `place` now; `before` is the picture there before it, see
+    /// [`Lessons::before`].
+    pub fn take_in(
+        &mut self,
+        context: &Context,
+        (k, place, band): (usize, Rect, &Band),
+        before: Option<Shown>,
+        lessons: &mut Lessons,
+        cut: &Cut,
+        costs: &mut StageCosts,
+    ) {
+        let sampled = band.sampled(context.world);
+        lessons.beyond += band.beyond;
+        self.glances.add(context.crop, &band.primaries, |p| p.weight * band.seen(sampled, p));
+        if lessons.techniques.kernel.adapts() {
+            let light = |p: &Primary| luminance(band.seen(sampled, p)) / p.albedo;
+            let look = Look {
+                band: context.crop,
+                sensor: context.sensor,
+                primaries: &band.primaries,
+                arrivals: &sampled.camera.arrivals,
+                seed: hash(context.seed ^ ADAPTATION_STREAM, context.completed),
+                completed: context.completed + 1,
+            };
+            self.adaptation.add(&look, light, cut);
+        }
+        costs.stage("adaptation", self.adaptation.bytes() + self.glances.bytes());
+        if !(lessons.guides || lessons.compares) {
+            return;
+        }
+        let Some(after) = Shown::of(context.film, place) else { return };
+        if let Some(before) = before {
+            let latest = before.latest(&after, context.completed);
+            if lessons.looks {
+                self.yardsticks.push(before);
+            }
+            lessons.deviation += self.yardsticks.get(k).map_or(0.0, |y| y.deviation(&latest));
+        }
+        if lessons.guides || lessons.looks {
+            let bytes = self.learn(context, band, &after, lessons, cut);
+            costs.hold(band.held() + bytes);
+            costs.stage("learning", bytes);
+        }
+    }
+
+    /// Learns from a band where light paths should begin and how many of them pay, by what they bring as a share of what
+    /// is shown. Returns the bytes that it took.
+    fn learn(
+        &mut self,
+        context: &Context,
+        band: &Band,
+        shown: &Shown,
+        lessons: &Lessons,
+        cut: &Cut,
+    ) -> usize {
+        let starts = band.primaries.iter().zip(shown.scales()).filter_map(|(p, scale)| {
+            let worth = p.weight * (LUMINANCE / scale);
+            let worth = if worth.is_finite() { worth } else { Vec3::ZERO };
+            Some(Start { arrival: p.arrival?, passages: p.passages, worth })
+        });
+        let starts: Vec<Start> = starts.collect();
+        let outcome = Outcome {
+            sampled: band.sampled(context.world),
+            weights: &band.weights,
+            reflected: &band.reflected,
+            starts: &starts,
+            max_depth: context.max_depth,
+        };
+        if lessons.looks {
+            self.economy.look(outcome, lessons.light_paths, lessons.bands, cut);
+        }
+        if lessons.guides { self.guiding.learn(outcome, cut) } else { 0 }
+    }
+
+    /// Ends an iteration, all of whose bands were taken in.
+    pub fn end(&mut self, context: &Context, lessons: &Lessons, cut: &Cut, costs: &mut StageCosts) {
+        let done = context.completed + 1;
+        let kernel = lessons.techniques.kernel;
+        if kernel.adapts() {
+            let [nominal, next] = [done - 1, done].map(|i| kernel.edge(i));
+            self.adaptation.end_iteration(nominal, next, done);
+            locked(&context.counters.hints).blur = self.adaptation.blur();
+        }
+        let rays = context.counters.rays.load(Relaxed) - lessons.rays_before;
+        self.glances.end_iteration(done, rays);
+        costs.stage("adaptation", 0);
+        if is_reported(lessons.index) {
+            let share = lessons.beyond / context.crop.area() as f64;
+            locked(&context.counters.hints).beyond_unfiltered = share;
+        }
+        if lessons.guides {
+            self.guiding.finish_iteration(context.world, cut);
+            costs.stage("learning", self.guiding.bytes());
+        }
+        if lessons.compares {
+            let departure = Departure { deviation: lessons.deviation, before: context.completed };
+            self.economy.judge(lessons.index, departure, context.world.has_hidden_light());
+            let left_out = self.economy.left_out();
+            *locked(&context.counters.left_out) = left_out;
+        }
+    }
+}
+
+impl Lessons {
+    /// A band of the picture before the iteration is in it, if that is asked for.
+    pub fn before(&self, context: &Context, place: Rect) -> Option<Shown> {
+        if self.compares { Shown::of(context.film, place) } else { None }
+    }
+}
+
+/// Whether light paths are left out where they do not pay.
+fn is_thrifty(context: &Context, techniques: &Techniques) -> bool {
+    !context.keep_all && techniques.can_do_without_light_paths()
+}
+
+/// Whether figures that hardly change are taken in an iteration: ever more rarely.
+pub(super) fn is_reported(index: u32) -> bool {
+    (index + 1).is_power_of_two()
+}
