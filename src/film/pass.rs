@@ -93,6 +93,11 @@ impl Pass {
     pub const fn is_first_hit(self) -> bool {
         matches!(self, Pass::Depth | Pass::Position | Pass::Uv | Pass::ObjectIndex | Pass::MaterialIndex)
     }
+
+    /// Whether a sample's first surface tells it, in the mean or by itself.
+    pub const fn is_of_surfaces(self) -> bool {
+        self.is_first_hit() || matches!(self, Pass::Normal | Pass::Albedo)
+    }
 }
 
 impl FromStr for Pass {

@@ -196,7 +196,7 @@ impl Band {
             next_event: self.techniques.next_event,
             goes_on: self.techniques.camera_paths,
         };
-        let wants_first_hits = context.film.passes().iter().any(Pass::is_first_hit);
+        let wants_first_hits = context.film.passes().iter().any(Pass::is_of_surfaces);
         let path = |x: u32, y: u32, (store, seen): &mut (CameraStore, Vec<_>), rays: &mut u64| {
             let (ray, mut random) = context.camera_sample(x, y, index);
             let (mut primary, first_hit) = sampler.path(&ray, &mut random, store, rays);
