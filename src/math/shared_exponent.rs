@@ -14,7 +14,8 @@ const NOT_FINITE: u32 = 511;
 const RAISE: i32 = 64;
 
 /// A colour without negative components, of any scale that `f32` has: each to within `2^-13` (1.2e-4) of the largest, rounded
-/// to nearest, so that errors cancel in sums (and to within 8e-43). What is not finite stays so, all of it; what is negative becomes zero.
+/// to nearest (and to within 8e-43): errors cancel in sums of colours of many scales, and components below a ten-thousandth of
+/// the largest are lost. What is not finite stays so, all of it; what is negative becomes zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SharedExponent([u16; 3]);
 

@@ -40,6 +40,8 @@ struct Seen {
     glances: u32,
     /// Luminance of all else, by iteration, and its square.
     rest: [f32; 2],
+    /// Iterations: not all pixels have the same where one was stopped between bands.
+    iterations: u32,
 }
 
 /// What is known of the light on primary segments.
@@ -47,16 +49,17 @@ struct Seen {
 pub struct Glances {
     picture: Rect,
     seen: Vec<Seen>,
-    /// For every block, rays that glances took, and how many each of its pixels takes.
+    /// For every block, rays that glances took.
     rays: Vec<u64>,
+    /// For every block, glances of each of its pixels in an iteration.
     numbers: Vec<u32>,
     /// All rays of the iterations so far.
     all_rays: u64,
 }
 
 impl Glances {
-    /// Begins a picture, a part of the full film, unless it has begun already. `has_chains`: whether there may be Dirac lobes.
-    pub fn begin(&mut self, picture: Rect, has_chains: bool) {
+    /// Begins a picture, a part of the full film, unless it has begun already. `may_chain`: whether there are Dirac lobes.
+    pub fn begin(&mut self, picture: Rect, may_chain: bool) {
         if self.picture != picture {
             let count = blocks(picture).into_iter().product();
             let seen = vec![Seen::default(); picture.area()];
@@ -64,7 +67,7 @@ impl Glances {
                 picture,
                 seen,
                 rays: vec![0; count],
-                numbers: vec![if has_chains { AT_FIRST } else { 1 }; count],
+                numbers: vec![if may_chain { AT_FIRST } else { 1 }; count],
                 all_rays: 0,
             };
         }
@@ -85,6 +88,7 @@ impl Glances {
                 seen.light = [seen.light[0] + sums[0], seen.light[1] + sums[1]];
                 seen.glances += p.glances;
                 seen.rest = [seen.rest[0] + rest, seen.rest[1] + rest * rest];
+                seen.iterations += 1;
             }
             self.rays[block(self.picture, x, y)] += u64::from(p.rays);
         }
@@ -104,7 +108,7 @@ impl Glances {
         for ((x, y), seen) in self.picture.pixels().zip(&self.seen) {
             let b = block(self.picture, x, y);
             let (light, variance) = mean_and_variance(seen.light, seen.glances);
-            let (others, noise) = mean_and_variance(seen.rest, completed);
+            let (others, noise) = mean_and_variance(seen.rest, seen.iterations);
             pixels[b] += 1;
             // roots, so that a few bright pixels do not decide
             brightness[b] += (light + others).max(0.0).sqrt();

@@ -69,20 +69,27 @@ impl OwnPath {
 
 impl Reflected {
     /// How much of the light these first arrivals reflect is beyond their own paths, squared as a share and summed: photons bring it
-    /// straight from lights through Dirac lobes, and camera segments hardly ever meet those lights.
-    pub fn beyond_own_paths(&self, s: Sampled, w: &Weights, firsts: &[u32], cut: &Cut) -> f64 {
+    /// straight from lights through Dirac lobes, and camera segments hardly ever meet those lights. `most`: bounces up to which light
+    /// counts. Without bridges, whose light would be among it.
+    pub fn beyond_own_paths(
+        &self,
+        s: Sampled,
+        w: &Weights,
+        firsts: &[u32],
+        most: Option<u32>,
+        cut: &Cut,
+    ) -> f64 {
         let mut values = photon_values(s, w);
         for (j, value) in values.iter_mut().enumerate() {
-            let is_straight = match s.light.photons.get(j).rivals {
-                Rivals::First { next_event_pdf, .. } => next_event_pdf == 0.0,
-                Rivals::Later { .. } => false,
-            };
-            let is_black = *value == SharedExponent::default();
-            if !(is_black || is_straight && photon_weight(s, w, j) > HARDLY_MET) {
+            let photon = s.light.photons.get(j);
+            // a first segment's bounces are its passages
+            let is_straight = matches!(photon.rivals, Rivals::First { .. }) && photon.bounces > 0;
+            if !(is_straight && photon_weight(s, w, j) > HARDLY_MET) {
                 *value = SharedExponent::default();
             }
         }
-        let beyond = gather_photons(s, w, &values, cut, |_| true);
+        let counts = |bounces| most.is_none_or(|most| bounces < most);
+        let beyond = gather_photons(s, w, &values, cut, counts);
         let square = |&i: &u32| {
             let i = i as usize;
             let share = luminance(beyond[i].decode()) / luminance(self.towards_camera(s, i));

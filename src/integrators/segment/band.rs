@@ -160,7 +160,7 @@ impl Band {
         costs.hold(self.held() + self.reflected.most_bytes() - self.reflected.bytes());
         costs.stage("propagation", self.reflected.bytes());
         context.counters.dropped.fetch_add(self.camera.dropped, Relaxed);
-        if solved && is_reported(index) {
+        if solved && is_reported(context.completed) {
             let sweeps = match (self.techniques.estimator, context.max_depth) {
                 (Estimator::LeaveOneOut, None) => context.operator_sweeps,
                 _ => 0,
@@ -169,8 +169,9 @@ impl Band {
             let report = self.reflected.report(sampled, &self.weights, &self.starts, sweeps, cut);
             *locked(&context.counters.graph) = Some(report);
             let mut beyond = 0.0;
-            if self.techniques.camera_paths {
-                beyond = self.reflected.beyond_own_paths(sampled, &self.weights, &self.starts, cut);
+            if self.techniques.camera_paths && self.techniques.bridges.is_none() {
+                let most = context.max_depth;
+                beyond = self.reflected.beyond_own_paths(sampled, &self.weights, &self.starts, most, cut);
             }
             self.beyond = beyond;
             costs.stage("report", 0);

@@ -171,8 +171,12 @@ impl Learnt {
         if lessons.guides { self.guiding.learn(outcome, cut) } else { 0 }
     }
 
-    /// Ends an iteration, all of whose bands were taken in.
+    /// Ends an iteration, all of whose bands are in the film. If it was stopped while they were taken in, what it says is
+    /// incomplete and decides nothing.
     pub fn end(&mut self, context: &Context, lessons: &Lessons, cut: &Cut, costs: &mut StageCosts) {
+        if cut.is_raised() {
+            return;
+        }
         let done = context.completed + 1;
         let kernel = lessons.techniques.kernel;
         if kernel.adapts() {
@@ -183,7 +187,7 @@ impl Learnt {
         let rays = context.counters.rays.load(Relaxed) - lessons.rays_before;
         self.glances.end_iteration(done, rays);
         costs.stage("adaptation", 0);
-        if is_reported(lessons.index) {
+        if is_reported(context.completed) {
             let share = lessons.beyond / context.crop.area() as f64;
             locked(&context.counters.hints).beyond_unfiltered = share;
         }
@@ -212,7 +216,7 @@ fn is_thrifty(context: &Context, techniques: &Techniques) -> bool {
     !context.keep_all && techniques.can_do_without_light_paths()
 }
 
-/// Whether figures that hardly change are taken in an iteration: ever more rarely.
-pub(super) fn is_reported(index: u32) -> bool {
-    (index + 1).is_power_of_two()
+/// Whether figures that hardly change are taken in an iteration before which so many were completed: ever more rarely.
+pub(super) fn is_reported(completed: u32) -> bool {
+    (completed + 1).is_power_of_two()
 }
