@@ -205,6 +205,8 @@ impl Session {
         let reason = std::thread::scope(|scope| {
             let worker = scope.spawn(|| {
                 let tile_done = |rect: Rect| announcements.add(rect);
+                // owned here, so that a panic drops it and the listener learns of that, too
+                let done = done;
                 let reason = self.iterate(method, &tile_done, &watch, (before, cpu_before));
                 // nobody listens any more only if the listener panicked
                 let _ = done.send(());

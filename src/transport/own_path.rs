@@ -81,6 +81,10 @@ impl Reflected {
     ) -> f64 {
         let mut values = photon_values(s, w);
         for (j, value) in values.iter_mut().enumerate() {
+            // where no camera path arrives there is no density either
+            if *value == SharedExponent::default() {
+                continue;
+            }
             let photon = s.light.photons.get(j);
             // a first segment's bounces are its passages
             let is_straight = matches!(photon.rivals, Rivals::First { .. }) && photon.bounces > 0;
