@@ -55,7 +55,7 @@ def render(scene: Scene, scale: int = 1, threads: int = 1) -> dict[str, Any]:
             "threads": threads,
             "kernel": "fixed",
             "kernel_size": 4.0 * scale,
-            "memory_budget": 8 << 30,
+            "memory_budget": 8192,
             "keep_all": True,
         },
     )

@@ -14,7 +14,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Sides of the blocks, pixels.
+/// Sides of the blocks, pixels; the first are single pixels.
 const SIDES: [usize; 5] = [1, 2, 4, 8, 16];
 /// Standard errors that are taken off: what is left is no chance.
 const DOUBT: f64 = 2.0;
@@ -98,17 +98,15 @@ pub(super) fn mean_square_by_size(slopes: &[[Slope; 2]], scales: &[Vec3], width:
 /// Sum over pixels, mean over channels, of the squared systematic error, from the mean differences of the two halves
 /// of every pixel, in rows of `width`; at least zero.
 pub(super) fn mean_square(differences: &[Halves], width: usize) -> f64 {
-    let beyond_doubt = |side| {
-        let [sum, error] = in_blocks(differences, width, side);
-        sum - DOUBT * error
-    };
-    SIDES.into_iter().map(beyond_doubt).fold(0.0, f64::max)
+    bounds(differences, width)[0]
 }
 
 /// That, and the most that is as likely as not: no block hides anything from single pixels.
 pub(super) fn bounds(differences: &[Halves], width: usize) -> [f64; 2] {
-    let [sum, error] = in_blocks(differences, width, 1);
-    [mean_square(differences, width), sum.max(0.0) + LENIENCE * error]
+    let sides = SIDES.map(|side| in_blocks(differences, width, side));
+    let low = sides.iter().map(|[sum, error]| sum - DOUBT * error).fold(0.0, f64::max);
+    let [sum, error] = sides[0];
+    [low, sum.max(0.0) + LENIENCE * error]
 }
 
 /// Sum over the blocks of their products, and its standard error.

@@ -43,3 +43,29 @@ fn a_render_that_paused_goes_on_as_if_it_had_not() {
     assert!(picture(&whole).iter().any(|&v| v > 0.0));
     assert_eq!(picture(&whole), picture(&paused));
 }
+
+/// Fails at once.
+struct Broken;
+
+impl Integrator for Broken {
+    fn iterate(&mut self, _: &Context, _: u32) -> IterationEnd {
+        panic!("broken on purpose")
+    }
+
+    fn is_all_or_nothing(&self) -> bool {
+        true
+    }
+
+    fn rest(&mut self) {}
+}
+
+/// It ends with an error, it is not waited for.
+#[test]
+fn a_panic_of_an_integrator_is_told() {
+    let broken = session(1);
+    *locked(&broken.integrator) = Box::new(Broken);
+    let told = broken.run(&mut Silent).unwrap_err().to_string();
+    assert!(told.contains("broken on purpose"), "{told}");
+    // what follows has a sound one again
+    assert_eq!(broken.run(&mut Silent).unwrap(), StopReason::Samples);
+}

@@ -205,14 +205,10 @@ impl World {
         SurfacePoint::new(&self.scene, &self.accel, &hit)
     }
 
-    /// The surface of an instance's triangle at the point nearest to one; barycentrics of the address do not count.
+    /// The surface of an instance's triangle at a point of it, to rounding; barycentrics of the address do not count.
     pub fn surface_near(&self, at: &Address, point: Vec3) -> SurfacePoint {
-        let corner = |u: f32, v: f32| {
-            let at = Address { barycentrics: Vec2::new(u, v), ..*at };
-            self.surface(&at).place.position.as_dvec3()
-        };
-        let origin = corner(0.0, 0.0);
-        let (a, b, p) = (corner(1.0, 0.0) - origin, corner(0.0, 1.0) - origin, point.as_dvec3() - origin);
+        let [origin, a, b] = self.corners(at).map(Vec3::as_dvec3);
+        let (a, b, p) = (a - origin, b - origin, point.as_dvec3() - origin);
         let (aa, ab, bb, pa, pb) = (a.dot(a), a.dot(b), b.dot(b), p.dot(a), p.dot(b));
         let scale = 1.0 / (aa * bb - ab * ab);
         let uv = DVec2::new(pa * bb - pb * ab, pb * aa - pa * ab) * scale;
@@ -237,9 +233,15 @@ impl World {
                 return None;
             }
         }
-        let to_world = &self.scene.instances[instance as usize].to_world;
+        Some(self.corners(at))
+    }
+
+    /// Corners of an instance's triangle, scene space.
+    fn corners(&self, at: &Address) -> [Vec3; 3] {
+        let mesh = &self.scene.meshes[self.scene.group(at.instance).mesh as usize];
+        let to_world = &self.scene.instances[at.instance as usize].to_world;
         let corner = |v: u32| to_world.transform_point3(mesh.positions[v as usize]);
-        Some(mesh.triangles[triangle as usize].map(corner))
+        mesh.triangles[at.triangle as usize].map(corner)
     }
 
     /// The scattering at a surface point that is seen along `wo`.

@@ -269,7 +269,6 @@ impl CameraSampler<'_> {
             let direction = sample.direction;
             let start_n2 = inverse_n2 / (sample.eta * sample.eta);
             let light_end = end.probability_from(self.world, direction);
-            met.clear();
             let mut meeting = Meeting {
                 world: self.world,
                 hits: &mut met,

@@ -12,6 +12,7 @@ use super::sizes::{block, blocks};
 use crate::film::Rect;
 use crate::math::luminance;
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Most glances of a pixel in an iteration.
 pub const MOST: u32 = 256;
@@ -79,9 +80,9 @@ impl Glances {
     }
 
     /// Adds what a band shows after an iteration: `reflected` is the radiance beside the light on its primary segment.
-    pub fn add(&mut self, band: Rect, primaries: &[Primary], reflected: impl Fn(&Primary) -> Vec3) {
-        for ((x, y), p) in band.pixels().zip(primaries) {
-            let seen = &mut self.seen[self.picture.index(x, y)];
+    pub fn add(&mut self, band: Rect, primaries: &[Primary], reflected: impl Fn(&Primary) -> Vec3 + Sync) {
+        let first = self.picture.index(band.x, band.y);
+        let add = |(seen, p): (&mut Seen, &Primary)| {
             let rest = luminance(reflected(p));
             let sums = [luminance(p.light) * p.glances as f32, p.square];
             if rest.is_finite() && sums.iter().all(|s| s.is_finite()) {
@@ -90,6 +91,9 @@ impl Glances {
                 seen.rest = [seen.rest[0] + rest, seen.rest[1] + rest * rest];
                 seen.iterations += 1;
             }
+        };
+        self.seen[first..][..band.area()].par_iter_mut().zip(primaries).for_each(add);
+        for ((x, y), p) in band.pixels().zip(primaries) {
             self.rays[block(self.picture, x, y)] += u64::from(p.rays);
         }
     }

@@ -11,6 +11,7 @@ use super::walk::Chain;
 use super::weigh::{Sampled, Weights};
 use crate::math::{SharedExponent, luminance};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Weight above which photons find what a camera path meets so rarely that its mean says nothing.
 const HARDLY_MET: f32 = 0.9;
@@ -79,19 +80,22 @@ impl Reflected {
         most: Option<u32>,
         cut: &Cut,
     ) -> f64 {
+        if !s.world.needs().mirrors {
+            return 0.0;
+        }
         let mut values = photon_values(s, w);
-        for (j, value) in values.iter_mut().enumerate() {
-            // where no camera path arrives there is no density either
-            if *value == SharedExponent::default() {
-                continue;
-            }
-            let photon = s.light.photons.get(j);
+        let is_beyond = |j: usize| {
             // a first segment's bounces are its passages
-            let is_straight = matches!(photon.rivals, Rivals::First { .. }) && photon.bounces > 0;
-            if !(is_straight && photon_weight(s, w, j) > HARDLY_MET) {
+            let is_straight = s.light.photons.bounces(j) > 0
+                && matches!(s.light.photons.get(j).rivals, Rivals::First { .. });
+            is_straight && photon_weight(s, w, j) > HARDLY_MET
+        };
+        values.par_iter_mut().enumerate().for_each(|(j, value)| {
+            // where no camera path arrives there is no density either
+            if *value != SharedExponent::default() && !is_beyond(j) {
                 *value = SharedExponent::default();
             }
-        }
+        });
         let counts = |bounces| most.is_none_or(|most| bounces < most);
         let beyond = gather_photons(s, w, &values, cut, counts);
         let square = |&i: &u32| {

@@ -1,9 +1,7 @@
 //! Radiance through the graph of clusters: `L(s) = T L_e + T sum over s' of f / A value(s')`.
 //!
 //! The photons of an iteration carry the flux of their own light paths, so what is gathered from them is
-//! constant; only the reflected radiance of camera segments is unknown. Leaving one out (the Mecke
-//! formula): the density of a segment whose light comes from a photon that landed in its end cluster counts
-//! the other photons there alone, since that one's presence is given.
+//! constant (`photons`); only the reflected radiance of camera segments is unknown.
 
 use super::Cut;
 use super::exchange::{GRAIN, Segments, along_path, emitted, gather, has_end, per_index};

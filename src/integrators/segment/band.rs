@@ -168,12 +168,10 @@ impl Band {
             let sampled = self.sampled(world);
             let report = self.reflected.report(sampled, &self.weights, &self.starts, sweeps, cut);
             *locked(&context.counters.graph) = Some(report);
-            let mut beyond = 0.0;
             if self.techniques.camera_paths && self.techniques.bridges.is_none() {
-                let most = context.max_depth;
-                beyond = self.reflected.beyond_own_paths(sampled, &self.weights, &self.starts, most, cut);
+                let (weights, starts, most) = (&self.weights, &self.starts, context.max_depth);
+                self.beyond = self.reflected.beyond_own_paths(sampled, weights, starts, most, cut);
             }
-            self.beyond = beyond;
             costs.stage("report", 0);
         }
         solved

@@ -14,7 +14,6 @@ use crate::transport::glances::Glances;
 use crate::transport::guiding::{Guiding, Outcome, Start};
 use crate::transport::{Cut, Techniques};
 use glam::Vec3;
-use std::sync::atomic::Ordering::Relaxed;
 
 /// Keeps the random numbers of the grids that choose sizes apart from all others.
 const ADAPTATION_STREAM: u32 = 0xada9_0000;
@@ -48,8 +47,6 @@ pub(super) struct Lessons {
     /// Its light paths, and the bands that share them.
     light_paths: f32,
     bands: usize,
-    /// Rays that were traced before it.
-    rays_before: u64,
     /// How far its picture is from those before.
     deviation: f64,
     /// Sum of what bands have beyond the camera's own paths.
@@ -62,15 +59,15 @@ impl Learnt {
         if is_thrifty(context, techniques) { self.economy.light_paths(all, index) } else { all }
     }
 
-    /// Begins an iteration whose light paths are sampled: so many, of which `arrived` arrived somewhere. `rays_before`: traced
-    /// before it.
+    /// Begins an iteration whose light paths are sampled: so many, of which `arrived` arrived somewhere.
     pub fn begin(
         &mut self,
         context: &Context,
         techniques: Techniques,
         index: u32,
-        (light_paths, arrived): (f32, usize),
-        (bands, rays_before): (usize, u64),
+        light_paths: f32,
+        arrived: usize,
+        bands: usize,
     ) -> Lessons {
         let is_thrifty = is_thrifty(context, &techniques);
         let guides = techniques.emission_guiding && self.guiding.begin_iteration(arrived);
@@ -91,7 +88,6 @@ impl Learnt {
             compares,
             light_paths,
             bands,
-            rays_before,
             deviation: 0.0,
             beyond: 0.0,
         }
@@ -172,8 +168,15 @@ impl Learnt {
     }
 
     /// Ends an iteration, all of whose bands are in the film. If it was stopped while they were taken in, what it says is
-    /// incomplete and decides nothing.
-    pub fn end(&mut self, context: &Context, lessons: &Lessons, cut: &Cut, costs: &mut StageCosts) {
+    /// incomplete and decides nothing. `rays`: traced in it.
+    pub fn end(
+        &mut self,
+        context: &Context,
+        lessons: &Lessons,
+        rays: u64,
+        cut: &Cut,
+        costs: &mut StageCosts,
+    ) {
         if cut.is_raised() {
             return;
         }
@@ -184,7 +187,6 @@ impl Learnt {
             self.adaptation.end_iteration(nominal, next, done);
             locked(&context.counters.hints).blur = self.adaptation.blur();
         }
-        let rays = context.counters.rays.load(Relaxed) - lessons.rays_before;
         self.glances.end_iteration(done, rays);
         costs.stage("adaptation", 0);
         if is_reported(context.completed) {

@@ -62,8 +62,8 @@ impl Segment {
             return false;
         }
         costs.stage("sampling", band.light.bytes());
-        let paths = (light_paths, band.light.starts.len());
-        let mut lessons = learnt.begin(context, *techniques, index, paths, (bands.len(), rays_before));
+        let arrived = band.light.starts.len();
+        let mut lessons = learnt.begin(context, *techniques, index, light_paths, arrived, bands.len());
         for (k, place) in bands.into_iter().enumerate() {
             let crop = Rect { x: context.crop.x + place.x, y: context.crop.y + place.y, ..place };
             let of_band = Context { crop, ..*context };
@@ -75,7 +75,8 @@ impl Segment {
             costs.stage("gather", band.primaries.capacity() * size_of::<Primary>());
             learnt.take_in(&of_band, (k, place, band), before, &mut lessons, cut, costs);
         }
-        learnt.end(context, &lessons, cut, costs);
+        let rays = context.counters.rays.load(Relaxed) - rays_before;
+        learnt.end(context, &lessons, rays, cut, costs);
         true
     }
 

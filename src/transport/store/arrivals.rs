@@ -1,6 +1,7 @@
 //! Arrivals as they are kept: 36 bytes each.
 
 use super::Arrival;
+use super::list::{List, Pack};
 use crate::math::Octahedral;
 use crate::shading::{Address, SurfaceClass};
 use glam::{DVec2, Vec2, Vec3};
@@ -27,7 +28,7 @@ pub fn storable_survival(q: f32) -> f32 {
 
 /// An arrival. What its scattering depends on differs with the class of its surface.
 #[derive(Clone, Copy, Debug)]
-struct Packed {
+pub struct PackedArrival {
     position: Vec3,
     instance: u32,
     triangle: u32,
@@ -39,8 +40,10 @@ struct Packed {
     state: u16,
 }
 
-impl Packed {
-    fn new(a: &Arrival) -> Self {
+impl Pack for PackedArrival {
+    type Item = Arrival;
+
+    fn pack(a: &Arrival) -> Self {
         let is_diffuse = a.class == SurfaceClass::Diffuse;
         let is_bright = is_diffuse && a.reflectance.max_element() > 1.0;
         let survival = (a.survival * f32::from(SURVIVAL_STEPS)).round() as u16;
@@ -67,7 +70,7 @@ impl Packed {
     }
 
     #[inline]
-    fn arrival(&self) -> Arrival {
+    fn unpack(&self) -> Arrival {
         let normal = self.normal.decode();
         let class = self.class();
         let is_diffuse = class == SurfaceClass::Diffuse;
@@ -87,7 +90,9 @@ impl Packed {
             goes_on: self.goes_on(),
         }
     }
+}
 
+impl PackedArrival {
     #[inline]
     fn reflectance(&self) -> Vec3 {
         match self.class() {
@@ -152,31 +157,9 @@ fn barycentrics(code: [u16; 3]) -> Vec2 {
 }
 
 /// Ends of segments.
-#[derive(Clone, Debug, Default)]
-pub struct Arrivals(Vec<Packed>);
+pub type Arrivals = List<PackedArrival>;
 
 impl Arrivals {
-    /// Their number.
-    pub fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// Adds one.
-    pub fn push(&mut self, a: Arrival) {
-        self.0.push(Packed::new(&a));
-    }
-
-    /// Arrival number `i`.
-    #[inline]
-    pub fn get(&self, i: usize) -> Arrival {
-        self.0[i].arrival()
-    }
-
     /// See [`Arrival::position`].
     #[inline]
     pub fn position(&self, i: usize) -> Vec3 {
@@ -212,37 +195,6 @@ impl Arrivals {
     pub fn triangle(&self, i: usize) -> (u32, u32) {
         (self.0[i].instance, self.0[i].triangle)
     }
-
-    /// All of them.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = Arrival> {
-        self.0.iter().map(Packed::arrival)
-    }
-
-    /// Appends those of another, which is left empty.
-    pub fn append(&mut self, other: &mut Self) {
-        self.0.append(&mut other.0);
-    }
-
-    /// Removes all and keeps the memory.
-    pub fn clear(&mut self) {
-        self.0.clear();
-    }
-
-    /// Makes room for so many more, and no more.
-    pub fn reserve(&mut self, count: usize) {
-        self.0.reserve_exact(count);
-    }
-
-    /// Memory, bytes.
-    pub fn bytes(&self) -> usize {
-        self.0.capacity() * size_of::<Packed>()
-    }
-}
-
-impl FromIterator<Arrival> for Arrivals {
-    fn from_iter<I: IntoIterator<Item = Arrival>>(arrivals: I) -> Self {
-        Self(arrivals.into_iter().map(|a| Packed::new(&a)).collect())
-    }
 }
 
 #[cfg(test)]
@@ -269,7 +221,7 @@ mod tests {
 
     #[test]
     fn arrivals_come_back_as_far_as_they_are_needed() {
-        assert_eq!(size_of::<Packed>(), 36);
+        assert_eq!(size_of::<PackedArrival>(), 36);
         for class in [SurfaceClass::Diffuse, SurfaceClass::Reflecting, SurfaceClass::Transmitting] {
             let arrivals: Vec<Arrival> = (0..1000).map(|k| arrival(k, class)).collect();
             let kept: Arrivals = arrivals.iter().copied().collect();

@@ -11,12 +11,14 @@
 mod arrivals;
 mod hits;
 mod leaving;
+mod list;
 mod photons;
 
-pub use arrivals::{Arrivals, storable_survival};
+pub use arrivals::{Arrivals, PackedArrival, storable_survival};
 pub use hits::Hits;
 pub use leaving::{NextEvents, Outgoings};
-pub use photons::Photons;
+pub use list::{List, Pack};
+pub use photons::{PackedPhoton, Photons};
 
 use super::sparse::Sparse;
 use crate::shading::bsdf::Bsdf;

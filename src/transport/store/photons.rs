@@ -1,5 +1,6 @@
 //! What arrivals of light paths carry, as it is kept: 32 bytes each.
 
+use super::list::{List, Pack};
 use super::{Photon, Rivals};
 use crate::math::{Octahedral, SharedExponent};
 use glam::Vec3;
@@ -9,8 +10,9 @@ const BOUNCES: u16 = (1 << 14) - 1;
 const FIRST: u16 = 1 << 14;
 const DELTA: u16 = 1 << 15;
 
+/// What an arrival of a light path carries, packed.
 #[derive(Clone, Copy, Debug)]
-struct Packed {
+pub struct PackedPhoton {
     path: u32,
     camera_choices: f32,
     /// Of a first segment its density and that of next event, of a later one `c` and `(n_start / n_end)^2`.
@@ -21,8 +23,10 @@ struct Packed {
     state: u16,
 }
 
-impl Packed {
-    fn new(p: &Photon) -> Self {
+impl Pack for PackedPhoton {
+    type Item = Photon;
+
+    fn pack(p: &Photon) -> Self {
         let (rivals, kind) = match p.rivals {
             Rivals::First { light_density, next_event_pdf, is_delta } => {
                 ([light_density, next_event_pdf], FIRST | if is_delta { DELTA } else { 0 })
@@ -41,7 +45,7 @@ impl Packed {
     }
 
     #[inline]
-    fn photon(&self) -> Photon {
+    fn unpack(&self) -> Photon {
         let [first, second] = self.rivals;
         let rivals = match self.state & FIRST != 0 {
             true => Rivals::First {
@@ -64,31 +68,9 @@ impl Packed {
 }
 
 /// What arrivals of light paths carry.
-#[derive(Clone, Debug, Default)]
-pub struct Photons(Vec<Packed>);
+pub type Photons = List<PackedPhoton>;
 
 impl Photons {
-    /// Their number.
-    pub fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// Adds that of the next arrival.
-    pub fn push(&mut self, p: Photon) {
-        self.0.push(Packed::new(&p));
-    }
-
-    /// That of arrival `j`.
-    #[inline]
-    pub fn get(&self, j: usize) -> Photon {
-        self.0[j].photon()
-    }
-
     /// See [`Photon::path`].
     #[inline]
     pub fn path(&self, j: usize) -> u32 {
@@ -118,31 +100,6 @@ impl Photons {
     pub fn pdf(&self, j: usize) -> f32 {
         self.0[j].pdf
     }
-
-    /// All of them.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = Photon> {
-        self.0.iter().map(Packed::photon)
-    }
-
-    /// Appends those of another, which is left empty.
-    pub fn append(&mut self, other: &mut Self) {
-        self.0.append(&mut other.0);
-    }
-
-    /// Removes all and keeps the memory.
-    pub fn clear(&mut self) {
-        self.0.clear();
-    }
-
-    /// Makes room for so many more, and no more.
-    pub fn reserve(&mut self, count: usize) {
-        self.0.reserve_exact(count);
-    }
-
-    /// Memory, bytes.
-    pub fn bytes(&self) -> usize {
-        self.0.capacity() * size_of::<Packed>()
-    }
 }
 
 #[cfg(test)]
@@ -151,7 +108,7 @@ mod tests {
 
     #[test]
     fn photons_come_back() {
-        assert_eq!(size_of::<Packed>(), 32);
+        assert_eq!(size_of::<PackedPhoton>(), 32);
         let first = Rivals::First { light_density: 3.0, next_event_pdf: 0.5, is_delta: true };
         let later = Rivals::Later { light_choices: 0.25, squeeze: 2.25 };
         let mut kept = Photons::default();
