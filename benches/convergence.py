@@ -2,7 +2,7 @@
 
 The scenes come from those that are shared between renderers (SEGUE_SHARED, or ../shared beside the checkout); without
 them it says so and does nothing. Four have references by other renderers, at twice the resolution. Those of the two
-interiors are means of independent renders by `segment` with a small fixed kernel, which blurs a third of a
+interiors are means of independent renders by `segment` with a small fixed kernel, which blurs half a
 pixel; how far two halves of them are apart is printed. Run:
 .venv/bin/python benches/convergence.py [SCENE ...]
 """
@@ -33,7 +33,7 @@ OTHERS = ("cornell_glass", "lamp", "ajar_door", "glossy_box")
 KEPT = ROOT / "build" / "references"
 #: Seconds of one thread for each method.
 SECONDS = 30.0
-KERNEL = 0.35
+KERNEL = 0.5
 
 
 def halved(made: Path, into: Path) -> tuple[int, int]:

@@ -5,7 +5,8 @@
 //! whose variance goes like one over the kernel's area. What a kernel of some size *would* blur is found by
 //! filtering that picture: grouped as the grid groups arrivals, the mean of a voxel less its pixel's own value, times the
 //! same of the other half and of another grid. Noise of the halves is independent, so the product is on average the squared
-//! difference alone, and what one grid does and another does not is noise, too. In every block of pixels the size counts for which the sum of both is least.
+//! difference alone, and what one grid does and another does not is noise, too. In every block of pixels the size counts for
+//! which the sum of both is least.
 
 use super::Cut;
 use super::camera::Primary;
@@ -30,6 +31,11 @@ const FIRST: u32 = 4;
 /// By how much squared differences count more than squared noise. The picture that is filtered is blurred already, so
 /// that it tells too little, least of all beside small bright spots (`benches/NOTES.md` has what other factors gave).
 const BLUR: f64 = 3.0;
+/// Random grids with which the picture is filtered. Beside small bright spots they differ so much that two may tell of no
+/// blur where there is a lot.
+const GRIDS: u32 = 8;
+/// Least blur, over what a single grid does: beside an edge about half of that is left by many.
+const LEAST_BLUR: f64 = 0.25;
 /// Share of a block's pixels that have to tell something.
 const LEAST_SHARE: f64 = 0.1;
 /// Cosine between normals of neighbouring pixels above which the surface goes on.
@@ -64,7 +70,8 @@ impl Evidence {
         let noise = self.noise * completed / densities;
         let error = |k: usize| {
             let of_grids = (self.of_one_grid[k] - self.blur[k]).max(0.0) / completed;
-            BLUR * self.blur[k].max(0.0) + of_grids + noise * f64::from(CANDIDATES[k]).exp2().powi(-2)
+            let blur = self.blur[k].max(LEAST_BLUR * self.of_one_grid[k]).max(0.0);
+            BLUR * blur + of_grids + noise * f64::from(CANDIDATES[k]).exp2().powi(-2)
         };
         let best = (0..CANDIDATES.len()).min_by(|&a, &b| error(a).total_cmp(&error(b)))?;
         error(best).is_finite().then_some(CANDIDATES[best])
@@ -184,14 +191,15 @@ impl Adaptation {
         let floor = DARK * (all / clear.len().max(1) as f64) as f32;
         let mut scales = vec![0.0f32; means.len()];
         let mut keys = Vec::new();
-        // of two independent grids
-        let mut differences = [vec![[0.0f32; 2]; means.len()], vec![[0.0f32; 2]; means.len()]];
+        // over the grids: of the differences in either half, and of their products
+        let mut sums = vec![([0.0f32; 2], 0.0f32); means.len()];
         for k in std::iter::once(JUDGE).chain((0..CANDIDATES.len()).filter(|&k| k != JUDGE)) {
             if cut.is_raised() {
                 return;
             }
-            for (g, of_grid) in differences.iter_mut().enumerate() {
-                let seed = hash(seed, (2 * k + g) as u32);
+            sums.fill(Default::default());
+            for g in 0..GRIDS {
+                let seed = hash(seed, GRIDS * k as u32 + g);
                 let grid = Grid::new(sensor, CANDIDATES[k].exp2(), seed);
                 keys.clear();
                 keys.par_extend(
@@ -207,11 +215,13 @@ impl Adaptation {
                         if k == JUDGE && g == 0 {
                             scales[i] = 1.0 / (middle(mean) + floor).max(f32::MIN_POSITIVE);
                         }
-                        of_grid[i] = [0, 1].map(|half| (mean[half] - means[i][half]) * scales[i]);
+                        let [a, b] = [0, 1].map(|half| (mean[half] - means[i][half]) * scales[i]);
+                        let (differences, products) = &mut sums[i];
+                        *differences = [differences[0] + a, differences[1] + b];
+                        *products += a * b;
                     }
                 }
             }
-            let product = |a: f32, b: f32| f64::from(a) * f64::from(b);
             for &(pixel, _) in &clear {
                 let i = pixel as usize;
                 let (x, y) = (band.x + pixel % band.width, band.y + pixel / band.width);
@@ -220,9 +230,10 @@ impl Adaptation {
                     evidence.pixels += 1.0;
                     evidence.noise += f64::from(0.5 * (means[i][0] - means[i][1]) * scales[i]).powi(2);
                 }
-                let [a, b] = [differences[0][i], differences[1][i]];
-                evidence.blur[k] += 0.5 * (product(a[0], b[1]) + product(a[1], b[0]));
-                evidence.of_one_grid[k] += 0.5 * (product(a[0], a[1]) + product(b[0], b[1]));
+                let ([a, b], same) = sums[i];
+                let (all, same, n) = (f64::from(a) * f64::from(b), f64::from(same), f64::from(GRIDS));
+                evidence.blur[k] += (all - same) / (n * (n - 1.0));
+                evidence.of_one_grid[k] += same / n;
             }
         }
     }
