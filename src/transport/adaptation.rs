@@ -33,7 +33,9 @@ const FIRST: u32 = 4;
 const BLUR: f64 = 3.0;
 /// Random grids with which the picture is filtered. Beside small bright spots they differ so much that two may tell of no
 /// blur where there is a lot.
-const GRIDS: u32 = 8;
+const GRIDS: u32 = 4;
+/// The part of a pixel's sorting key that is its voxel's; the rest is its number.
+const VOXEL: u64 = !0 << 32;
 /// Least blur, over what a single grid does: beside an edge about half of that is left by many.
 const LEAST_BLUR: f64 = 0.25;
 /// Share of a block's pixels that have to tell something.
@@ -190,7 +192,7 @@ impl Adaptation {
         let all = clear.iter().map(|&(pixel, _)| f64::from(middle(means[pixel as usize]))).sum::<f64>();
         let floor = DARK * (all / clear.len().max(1) as f64) as f32;
         let mut scales = vec![0.0f32; means.len()];
-        let mut keys = Vec::new();
+        let mut keys: Vec<u64> = Vec::new();
         // over the grids: of the differences in either half, and of their products
         let mut sums = vec![([0.0f32; 2], 0.0f32); means.len()];
         for k in std::iter::once(JUDGE).chain((0..CANDIDATES.len()).filter(|&k| k != JUDGE)) {
@@ -202,13 +204,14 @@ impl Adaptation {
                 let seed = hash(seed, GRIDS * k as u32 + g);
                 let grid = Grid::new(sensor, CANDIDATES[k].exp2(), seed);
                 keys.clear();
-                keys.par_extend(
-                    clear.par_iter().map(|&(pixel, a)| (grid.key(&arrivals.get(a as usize)), pixel)),
-                );
+                keys.par_extend(clear.par_iter().map(|&(pixel, a)| {
+                    // half a key does: now and then two voxels are one
+                    grid.key(&arrivals.get(a as usize)) & VOXEL | u64::from(pixel)
+                }));
                 // pixels make the order unique, so it does not depend on the threads
                 keys.par_sort_unstable();
-                for voxel in keys.chunk_by(|a, b| a.0 == b.0) {
-                    let pixels = voxel.iter().map(|&(_, pixel)| pixel as usize);
+                for voxel in keys.chunk_by(|a, b| a & VOXEL == b & VOXEL) {
+                    let pixels = voxel.iter().map(|&key| (key & !VOXEL) as usize);
                     let sum = pixels.clone().fold([0.0; 2], |s, i| [s[0] + means[i][0], s[1] + means[i][1]]);
                     let mean = sum.map(|s| s / voxel.len() as f32);
                     for i in pixels {
