@@ -1,4 +1,5 @@
-"""The reports of docs/convergence: error against run time of the method, its parts and its rivals.
+"""The reports of docs/convergence: error against run time of the method, its parts and its rivals; and their last figures
+as a section of docs/method.md.
 
 The scenes come from those that are shared between renderers (SEGUE_SHARED, or ../shared beside the checkout); without
 them it says so and does nothing. Four have references by other renderers, at twice the resolution. Those of the two
@@ -9,6 +10,7 @@ pixel; how far two halves of them are apart is printed. Run:
 
 from __future__ import annotations
 
+import csv
 import os
 import subprocess
 import sys
@@ -17,6 +19,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from sections import replace_section
 from segue import Render, images, usd
 
 ROOT = Path(__file__).parent.parent
@@ -34,6 +37,14 @@ KEPT = ROOT / "build" / "references"
 #: Seconds of one thread for each method.
 SECONDS = 30.0
 KERNEL = 0.5
+HEADING = "Error against run time"
+HEAD = f"""MAPE in percent and, in brackets, relMSE of eight methods after {SECONDS:g} seconds of one thread, the lowest MAPE first, by `benches/convergence.py`; the whole curves are in
+`docs/convergence`. References are by other renderers, at 128 × 128, or those of the interiors (180 × 120) by `segment` with a fixed kernel of {KERNEL:g} pixels. `progressive` and `fixed` are `segment` with those
+kernels; that of `segment`, of `mvf` and of `photon-filter` is adaptive.
+
+| scene |{" |" * len(METHODS.split(","))}
+| --- |{" --- |" * len(METHODS.split(","))}
+"""
 
 
 def halved(made: Path, into: Path) -> tuple[int, int]:
@@ -81,6 +92,20 @@ def nameless(report: Path, folders: list[Path]) -> None:
         path.write_text(text)
 
 
+def row(report: Path) -> str:
+    """A row of the table: how the curves of a report end."""
+    last = {}
+    with (report / "curves.csv").open() as lines:
+        for point in csv.DictReader(lines):
+            last[point["method"].removeprefix("segment-")] = point
+    best = sorted(last.items(), key=lambda item: float(item[1]["mape"]))
+    cells = [
+        f"{method} {100 * float(p['mape']):.1f} ({float(p['relmse']):.2g})"
+        for method, p in best
+    ]
+    return f"| {report.name} | " + " | ".join(cells) + " |\n"
+
+
 def main(names: list[str]) -> int:
     """Makes the reports of these scenes, or of all."""
     REPORTS.mkdir(parents=True, exist_ok=True)
@@ -109,6 +134,9 @@ def main(names: list[str]) -> int:
             if status:
                 return status
             nameless(REPORTS / name, [stage.parent, made.parent])
+    reports = sorted(p.parent for p in REPORTS.glob("*/curves.csv"))
+    body = HEAD + "".join(map(row, reports))
+    replace_section(ROOT / "docs" / "method.md", HEADING, body)
     return 0
 
 

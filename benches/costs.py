@@ -19,7 +19,7 @@ from segue import Render, Scene, usd
 
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared"))
-RESOLUTION, SAMPLES, REPEATS = [480, 270], 4, 3
+RESOLUTION, SAMPLES, REPEATS = [384, 216], 4, 3
 LARGE = [1920, 1080]
 STAGES = ("sampling", "clustering", "areas", "weights", "propagation")
 HEADING = "What an iteration costs"
