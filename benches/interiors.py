@@ -36,15 +36,15 @@ HEADING = "Scenes made by others"
 HEAD = f"""relMSE after {SECONDS:g} seconds of {THREADS} threads (processor seconds over threads; loading, building and compiling left out), {WIDTH}
 pixels wide, by `benches/interiors.py`. `segment` and `path`: against two references by `segment` with a fixed kernel of a third of a pixel and other seeds,
 {2 * SECONDS:g} s each, so that blur and whatever else is wrong with the pictures counts. Mitsuba (`llvm_ad_rgb`, `path`, the scenes' original materials, which
-differ a little): noise alone, from two renders of other seeds.
+differ a little): noise alone, from two renders of other seeds, by the same references' brightness.
 
 | scene | `segment` | `path` | Mitsuba | Mitsuba over `segment` |
 | --- | ---: | ---: | ---: | ---: |
 """
 
 
-def theirs(stage: Path) -> tuple[tuple[int, int], float]:
-    """Resolution of Mitsuba's pictures, and their relative error at the time that counts."""
+def theirs(stage: Path) -> tuple[np.ndarray, float]:
+    """Two pictures by Mitsuba, and the share of the time that counts which each of them took."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "pictures.npy"
         command = [
@@ -63,17 +63,17 @@ def theirs(stage: Path) -> tuple[tuple[int, int], float]:
             stdout=subprocess.PIPE,
             text=True,
         )
-        a, b = np.load(out)
+        pictures = np.load(out)
     seconds = np.mean(json.loads(done.stdout.splitlines()[-1]))
-    return (a.shape[1], a.shape[0]), relative_noise(a, b) * seconds / SECONDS
+    return pictures, float(seconds) / SECONDS
 
 
 def row(name: str) -> str:
     """The table's row of a scene."""
     stage = SHARED / "scenes" / name / f"{name}.usdc"
-    resolution, noise = theirs(stage)
+    pair, their_time = theirs(stage)
     scene = usd.load(stage).scene
-    common = {"resolution": list(resolution), "threads": THREADS}
+    common = {"resolution": [pair.shape[2], pair.shape[1]], "threads": THREADS}
 
     def picture(**settings: object) -> tuple[np.ndarray, float]:
         job = Render(scene, {**common, **settings})
@@ -85,6 +85,7 @@ def row(name: str) -> str:
         picture(time=2 * SECONDS, **{**SHARP, "seed": SHARP["seed"] + k})[0]
         for k in range(2)
     )
+    noise = relative_noise(*pair, (first + second) / 2) * their_time
     errors = []
     for method in ("segment", "path"):
         ours, time = picture(integrator=method, time=SECONDS)

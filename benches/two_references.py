@@ -29,6 +29,7 @@ def relative_error(picture: np.ndarray, first: np.ndarray, second: np.ndarray) -
     return relative(squares, (first + second) / 2)
 
 
-def relative_noise(a: np.ndarray, b: np.ndarray) -> float:
-    """Relative variance of each of two pictures that differ by noise alone."""
-    return relative((a - b) ** 2 / 2, (a + b) / 2)
+def relative_noise(a: np.ndarray, b: np.ndarray, mean: np.ndarray) -> float:
+    """Variance of each of two pictures that differ by noise alone, relative to what they ought to show: their own
+    mean has their specks in it, and would excuse them."""
+    return relative((a - b) ** 2 / 2, mean)

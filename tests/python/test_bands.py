@@ -69,3 +69,26 @@ def test_bands_with_a_crop_and_a_last_narrow_one() -> None:
     # what camera rays meet first does not depend on bands
     assert depths[0].shape[:2] == (99, 60)
     assert np.array_equal(depths[0], depths[1])
+
+
+def test_long_paths_keep_within_the_budget() -> None:
+    """In a closed white room paths have dozens of arrivals: its bands are the smaller."""
+    scene = segue.Scene()
+    surface = {"type": "diffuse", "color": 0.97}
+    white = scene.add_material("white", {"surface": surface})
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    sides = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4]]
+    sides += [[1, 3, 7, 5]]
+    triangles = np.array([[[a, b, c], [a, c, d]] for a, b, c, d in sides]).ravel()
+    mesh = scene.add_mesh("room", corners.astype(np.float32), triangles)
+    scene.add_instances("room", mesh, np.eye(4), [white])
+    scene.add_light("lamp", {"type": "point", "intensity": [1, 1, 1]})
+    scene.set_camera("camera", {"window": [-1, 1, -1, 1]})
+    budget = 64
+    settings = {"resolution": [192, 192], "samples": 1, "memory_budget": budget}
+    job = segue.Render(scene, settings)
+    job.run()
+    stats = job.stats()
+    held = stats["segments"] * stats["bytes_per_segment"]
+    # a row of tiles is the least, and light paths are those of all bands
+    assert held < 1.5 * budget * 2**20

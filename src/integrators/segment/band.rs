@@ -17,6 +17,7 @@ use crate::transport::store::{CameraStore, LightStore};
 use crate::transport::weigh::{Sampled, Weights};
 use crate::transport::{Cut, Estimator, Techniques};
 use glam::Vec3;
+use rayon::prelude::*;
 use std::mem::take;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -26,6 +27,9 @@ const LIGHT_STREAM: u32 = 0x11e4_7000;
 const GRID_STREAM: u32 = 0x961d_0000;
 /// Keeps those of bridges apart.
 const BRIDGE_STREAM: u32 = 0xb21d_9e00;
+
+/// Camera paths by which it is found how long they are.
+const PILOTS: usize = 256;
 
 /// What is sampled of a band, how it is clustered, and what comes of it. The light paths are those of all bands.
 #[derive(Debug, Default)]
@@ -177,15 +181,13 @@ impl Band {
         solved
     }
 
-    fn sample_camera(
-        &mut self,
-        context: &Context,
-        learnt: &Learnt,
-        index: u32,
+    fn camera_sampler<'a>(
+        &self,
+        context: &'a Context,
+        learnt: &'a Learnt,
         light_paths: f32,
-        cut: &Cut,
-    ) -> bool {
-        let sampler = CameraSampler {
+    ) -> CameraSampler<'a> {
+        CameraSampler {
             world: context.world,
             sensor: context.sensor,
             guide: &learnt.guiding.guide,
@@ -194,7 +196,34 @@ impl Band {
             max_depth: context.max_depth,
             next_event: self.techniques.next_event,
             goes_on: self.techniques.camera_paths,
+        }
+    }
+
+    /// Arrivals of a camera path, on average over some pixels of the picture.
+    pub fn mean_arrivals(&self, context: &Context, learnt: &Learnt) -> f32 {
+        // where they end after one arrival, light paths do not
+        let sampler = CameraSampler { goes_on: true, ..self.camera_sampler(context, learnt, 0.0) };
+        let (width, area) = (context.crop.width as usize, context.crop.area());
+        let arrivals = |pixel: usize| {
+            let (ray, mut random) = context.camera_sample((pixel % width) as u32, (pixel / width) as u32, 0);
+            let mut store = CameraStore::default();
+            sampler.path(&ray, &mut random, &mut store, &mut 0);
+            store.arrivals.len()
         };
+        let pixels: Vec<usize> = (0..area).step_by(area.div_ceil(PILOTS)).collect();
+        let count: usize = pixels.par_iter().map(|&pixel| arrivals(pixel)).sum();
+        count as f32 / pixels.len() as f32
+    }
+
+    fn sample_camera(
+        &mut self,
+        context: &Context,
+        learnt: &Learnt,
+        index: u32,
+        light_paths: f32,
+        cut: &Cut,
+    ) -> bool {
+        let sampler = self.camera_sampler(context, learnt, light_paths);
         let wants_first_hits = context.film.passes().iter().any(Pass::is_of_surfaces);
         let path = |x: u32, y: u32, (store, seen): &mut (CameraStore, Vec<_>), rays: &mut u64| {
             let (ray, mut random) = context.camera_sample(x, y, index);

@@ -11,10 +11,10 @@ use band::Band;
 use learning::Learnt;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// What the segments of a camera path take until they are in the film, about, bytes.
-const BYTES_PER_PIXEL: u64 = 2048;
-/// Most light paths for each pixel of a band, so that theirs stay within bounds, too.
-const LIGHT_PATHS_PER_PIXEL: u64 = 4;
+/// What an arrival and the segment that leaves it take until they are in the film, about, bytes.
+const BYTES_PER_ARRIVAL: f32 = 100.0;
+/// Arrivals of a pixel, its camera path's and a light path's, for which there is room at least, and arrivals of a light path.
+const LEAST_ARRIVALS: [f32; 2] = [20.0, 5.0];
 
 /// Segment-based light transport. Its stores are kept from one iteration to the next.
 #[derive(Debug, Default)]
@@ -22,12 +22,14 @@ pub struct Segment {
     techniques: Techniques,
     band: Band,
     learnt: Learnt,
+    /// Mean arrivals of a camera path, once they have been counted: closed white rooms have very long ones.
+    arrivals: Option<f32>,
 }
 
 impl Segment {
     /// With these techniques.
     pub fn new(techniques: Techniques) -> Self {
-        Self { techniques, band: Band::new(techniques), learnt: Learnt::default() }
+        Self { techniques, band: Band::new(techniques), ..Self::default() }
     }
 }
 
@@ -54,9 +56,11 @@ impl Segment {
     /// stopped.
     fn all_bands(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
         let rays_before = context.counters.rays.load(Relaxed);
-        let bands = self.bands(context);
-        let all = self.most_light_paths(context);
-        let Self { techniques, band, learnt } = self;
+        let counted = || self.band.mean_arrivals(context, &self.learnt);
+        let arrivals = *self.arrivals.get_or_insert_with(counted);
+        let bands = self.bands(context, arrivals);
+        let all = self.most_light_paths(context, arrivals);
+        let Self { techniques, band, learnt, .. } = self;
         let light_paths = learnt.light_paths(context, techniques, all, index);
         if !band.sample_light(context, learnt, index, light_paths as u32, cut) {
             return false;
@@ -80,23 +84,26 @@ impl Segment {
         true
     }
 
-    /// Pixels of a band at most.
-    fn band_pixels(&self) -> u64 {
-        self.techniques.memory_budget / BYTES_PER_PIXEL
+    /// How many there may be of what has so many arrivals each.
+    fn affordable(&self, arrivals: f32) -> f32 {
+        self.techniques.memory_budget as f32 / (arrivals * BYTES_PER_ARRIVAL)
     }
 
     /// The parts of the film that are made one after the other: each is clustered for itself, with all light paths. What
-    /// bridges bring to the lens may arrive anywhere, so theirs is one.
-    fn bands(&self, context: &Context) -> Vec<Rect> {
+    /// bridges bring to the lens may arrive anywhere, so theirs is one. `arrivals`: of a camera path, on average.
+    fn bands(&self, context: &Context, arrivals: f32) -> Vec<Rect> {
+        // light paths are as long
+        let of_pixel = (2.0 * arrivals).max(LEAST_ARRIVALS[0]);
+
         match self.techniques.bridges {
-            None => context.film.bands(self.band_pixels()),
+            None => context.film.bands(self.affordable(of_pixel) as u64),
             Some(_) => vec![context.film.rect()],
         }
     }
 
-    /// Light paths of an iteration, if all are sampled.
-    fn most_light_paths(&self, context: &Context) -> f32 {
+    /// Light paths of an iteration, if all are sampled; they are those of all bands. `arrivals`: of a path, on average.
+    fn most_light_paths(&self, context: &Context, arrivals: f32) -> f32 {
         let wanted = (self.techniques.light_paths * context.film.rect().area() as f32).ceil();
-        wanted.min((LIGHT_PATHS_PER_PIXEL * self.band_pixels()).max(1) as f32)
+        wanted.min(self.affordable(arrivals.max(LEAST_ARRIVALS[1])).floor().max(1.0))
     }
 }
