@@ -13,7 +13,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 /// What an arrival and the segment that leaves it take until they are in the film, about, bytes.
 const BYTES_PER_ARRIVAL: f32 = 100.0;
-/// Arrivals of a pixel, its camera path's and a light path's, for which there is room at least, and arrivals of a light path.
+/// Arrivals for which there is room at least: for each pixel of a band, with those of a light path, and for each light path.
 const LEAST_ARRIVALS: [f32; 2] = [20.0, 5.0];
 
 /// Segment-based light transport. Its stores are kept from one iteration to the next.
@@ -92,13 +92,12 @@ impl Segment {
     /// The parts of the film that are made one after the other: each is clustered for itself, with all light paths. What
     /// bridges bring to the lens may arrive anywhere, so theirs is one. `arrivals`: of a camera path, on average.
     fn bands(&self, context: &Context, arrivals: f32) -> Vec<Rect> {
+        if self.techniques.bridges.is_some() {
+            return vec![context.film.rect()];
+        }
         // light paths are as long
         let of_pixel = (2.0 * arrivals).max(LEAST_ARRIVALS[0]);
-
-        match self.techniques.bridges {
-            None => context.film.bands(self.affordable(of_pixel) as u64),
-            Some(_) => vec![context.film.rect()],
-        }
+        context.film.bands(self.affordable(of_pixel) as u64)
     }
 
     /// Light paths of an iteration, if all are sampled; they are those of all bands. `arrivals`: of a path, on average.
