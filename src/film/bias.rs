@@ -82,17 +82,35 @@ impl Slope {
     }
 }
 
-/// As [`mean_square`], from the slopes over the kernel's size, where it varied. `scales`: factors that make light relative.
-pub(super) fn mean_square_by_size(slopes: &[[Slope; 2]], scales: &[Vec3], width: usize) -> Option<f64> {
-    let mut variance = 0.0;
-    let mut one = |([even, odd], scale): (&[Slope; 2], &Vec3)| {
-        let (even, odd) = (even.covariance(), odd.covariance());
-        variance += f64::from(even.1) * f64::from(odd.1) / slopes.len() as f64;
-        [even.0 * scale, odd.0 * scale].map(|v| if v.is_finite() { v } else { Vec3::ZERO })
-    };
-    let covariances: Vec<Halves> = slopes.iter().zip(scales).map(&mut one).collect();
-    // pixels whose kernel varied more know more, and count as much
-    (variance > LEAST_VARIANCE.powi(2)).then(|| PER_SLOPE * mean_square(&covariances, width) / variance)
+/// How the light of every pixel goes with the kernel's size.
+#[derive(Debug, Default)]
+pub(super) struct BySize {
+    covariances: Vec<Halves>,
+    /// Sum over pixels of the squared variance of the size.
+    variance: f64,
+}
+
+impl BySize {
+    /// What a pixel of `pixels` says.
+    pub fn add(&mut self, pixel: usize, pixels: usize, slopes: [Slope; 2]) {
+        self.covariances.resize(pixels, Halves::default());
+        let [even, odd] = slopes.map(|s| s.covariance());
+        self.variance += f64::from(even.1) * f64::from(odd.1);
+        self.covariances[pixel] = [even.0, odd.0];
+    }
+
+    /// As [`mean_square`], where the size varied. `scales`: factors that make light relative.
+    pub fn mean_square(mut self, scales: &[Vec3], width: usize) -> Option<f64> {
+        // pixels whose kernel varied more know more, and count as much
+        let variance = self.variance / self.covariances.len().max(1) as f64;
+        (variance > LEAST_VARIANCE.powi(2)).then(|| {
+            for (covariance, &scale) in self.covariances.iter_mut().zip(scales) {
+                let finite = |c: Vec3| if c.is_finite() { c } else { Vec3::ZERO };
+                *covariance = covariance.map(|c| finite(c * scale));
+            }
+            PER_SLOPE * mean_square(&self.covariances, width) / variance
+        })
+    }
 }
 
 /// Sum over pixels, mean over channels, of the squared systematic error, from the mean differences of the two halves
@@ -161,6 +179,12 @@ mod tests {
         }
     }
 
+    fn by_size(slopes: &[[Slope; 2]], width: usize) -> Option<f64> {
+        let mut by_size = BySize::default();
+        slopes.iter().enumerate().for_each(|(pixel, &s)| by_size.add(pixel, slopes.len(), s));
+        by_size.mean_square(&vec![Vec3::ONE; slopes.len()], width)
+    }
+
     /// Light that changes by `slope` an octave, under noise of this width and kernels of two sizes an octave apart.
     fn found_by_size(slope: f32, noise: f32, seed: u32) -> Option<f64> {
         let mut slopes = vec![[Slope::default(); 2]; PIXELS];
@@ -172,7 +196,7 @@ mod tests {
                 halves[k as usize % 2].add(light, z);
             }
         }
-        mean_square_by_size(&slopes, &vec![Vec3::ONE; PIXELS], WIDTH).map(|sum| sum / PIXELS as f64)
+        by_size(&slopes, WIDTH).map(|sum| sum / PIXELS as f64)
     }
 
     #[test]
@@ -186,8 +210,8 @@ mod tests {
         // of one size nothing can be told
         let mut same = Slope::default();
         (0..9).for_each(|k| same.add(Vec3::splat(k as f32), 0.3));
-        assert_eq!(mean_square_by_size(&[[same; 2]], &[Vec3::ONE], 1), None);
-        assert_eq!(mean_square_by_size(&[], &[], 1), None);
+        assert_eq!(by_size(&[[same; 2]], 1), None);
+        assert_eq!(by_size(&[], 1), None);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! `mean((x - r)² / (r² + (0.01 mean r)²))`. It is the sum of what more samples average out ([`super::noise`]) and of what
 //! is systematic ([`super::bias`]).
 
-use super::bias::{self, Halves, Hints, Slope};
+use super::bias::{self, BySize, Halves, Hints};
 use super::noise::{Pixel, of_pixel, scales};
 use super::{Film, Tile};
 use glam::Vec3;
@@ -38,7 +38,7 @@ impl Film {
     pub fn estimated_error(&self, hints: Hints) -> Option<ErrorEstimate> {
         let (width, area) = (self.width() as usize, self.rect().area());
         let mut pixels = vec![None; area];
-        let (mut differences, mut slopes) = (Vec::new(), Vec::new());
+        let (mut differences, mut by_size) = (Vec::new(), BySize::default());
         self.visit(self.rect(), |tile, pixel, place| {
             pixels[place] = of_pixel(tile, pixel);
             if pixels[place].is_none() {
@@ -49,8 +49,7 @@ impl Film {
                 differences[place] = found;
             }
             if let Some(found) = tile.slopes(pixel) {
-                slopes.resize(area, [Slope::default(); 2]);
-                slopes[place] = found;
+                by_size.add(place, area, found);
             }
         });
         let count = pixels.iter().flatten().count();
@@ -75,7 +74,7 @@ impl Film {
         let count = count as f64;
         let unfiltered =
             (!differences.is_empty()).then(|| bias::bounds(&differences, width).map(|sum| sum / count));
-        let by_size = bias::mean_square_by_size(&slopes, &scales, width).map(|sum| sum / count);
+        let by_size = by_size.mean_square(&scales, width).map(|sum| sum / count);
         Some(ErrorEstimate { noise, bias: bias::agreed(unfiltered, by_size, hints) })
     }
 }

@@ -159,51 +159,54 @@ impl Context<'_> {
 
 /// Keeps the random numbers of further camera samples apart from those of the first.
 const GLANCE_STREAM: u32 = 0x91a9_ce00;
-/// Light paths that one task samples.
-const LIGHT_BATCH: u32 = 1024;
-
+/// Paths that one task samples.
+const TASK: usize = 64;
 /// Portions in which tasks are done, so that their stores are not all kept beside what they are put together to.
-const PORTIONS: u32 = 16;
+const PORTIONS: usize = 16;
 /// Fewest tasks of a portion for each thread: all should have something to do.
-const TASKS_PER_THREAD: u32 = 4;
+const TASKS_PER_THREAD: usize = 4;
 
 /// So many tasks, portion by portion.
-fn portions(tasks: u32) -> impl Iterator<Item = Range<u32>> {
-    let least = TASKS_PER_THREAD * rayon::current_num_threads() as u32;
+fn portions(tasks: usize) -> impl Iterator<Item = Range<usize>> {
+    let least = TASKS_PER_THREAD * rayon::current_num_threads();
     let size = tasks.div_ceil(PORTIONS).max(least);
-    (0..tasks).step_by(size as usize).map(move |first| first..tasks.min(first + size))
+    (0..tasks).step_by(size).map(move |first| first..tasks.min(first + size))
 }
 
 impl Context<'_> {
-    /// Samples so many light paths, batch by batch, each batch into a store of its own. `path` samples the path of a
-    /// number and adds the rays it takes; `take` is given the stores in order, some at a time. If it is stopped, they are
-    /// incomplete.
-    fn light_batches<S: Default + Send>(
+    /// Samples so many paths, some at a time, each time into a store of their own. `path` samples the path of a number and
+    /// adds the rays it takes; `take` is given the stores in order, while the next ones are made. If it is stopped, they
+    /// are incomplete.
+    fn paths<S: Default + Send>(
         &self,
-        paths: u32,
-        path: impl Fn(u32, &mut S, &mut u64) + Sync,
-        mut take: impl FnMut(Vec<S>),
+        paths: usize,
+        path: impl Fn(usize, &mut S, &mut u64) + Sync,
+        mut take: impl FnMut(Vec<S>) + Send,
     ) {
-        for batches in portions(paths.div_ceil(LIGHT_BATCH)) {
-            let batches = batches.into_par_iter();
-            let one = |b| self.task(b * LIGHT_BATCH..paths.min((b + 1) * LIGHT_BATCH), &path);
-            take(batches.map(one).collect());
+        let one = |task| self.task(task * TASK..paths.min((task + 1) * TASK), &path);
+        let mut made = vec![];
+        for tasks in portions(paths.div_ceil(TASK)) {
+            // or idle threads would wait for whole runs of tasks
+            let next = || tasks.into_par_iter().with_max_len(1).map(one).collect();
+            (_, made) = rayon::join(|| take(made), next);
         }
+        take(made);
     }
 
     /// The same for one camera path a pixel, row by row; `path` is given the pixel.
-    fn camera_rows<S: Default + Send>(
+    fn camera_paths<S: Default + Send>(
         &self,
         path: impl Fn(u32, u32, &mut S, &mut u64) + Sync,
-        mut take: impl FnMut(Vec<S>),
+        take: impl FnMut(Vec<S>) + Send,
     ) {
-        for rows in portions(self.crop.height) {
-            let one = |y| self.task(0..self.crop.width, |x, store, rays| path(x, y, store, rays));
-            take(rows.into_par_iter().map(one).collect());
-        }
+        let (width, pixels) = (self.crop.width as usize, self.crop.area());
+        let of_pixel = |k, store: &mut S, rays: &mut u64| {
+            path((k % width) as u32, (k / width) as u32, store, rays);
+        };
+        self.paths(pixels, of_pixel, take);
     }
 
-    fn task<S: Default>(&self, paths: Range<u32>, path: impl Fn(u32, &mut S, &mut u64)) -> S {
+    fn task<S: Default>(&self, paths: Range<usize>, path: impl Fn(usize, &mut S, &mut u64)) -> S {
         let (mut store, mut rays) = (S::default(), 0);
         for k in paths {
             if self.stop.is_raised() {

@@ -10,6 +10,7 @@ use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Most camera arrivals, and half of the most light arrivals, in a cluster whose lobes are evaluated pair by
 /// pair; larger ones are divided at random.
@@ -85,10 +86,9 @@ pub struct Clusters {
     pub clusters: Vec<Cluster>,
     /// Numbers of the arrivals, cluster by cluster.
     pub order: Vec<u32>,
-    /// Place in the order of every arrival that is in a cluster.
-    pub place: Vec<u32>,
-    /// Cluster of every arrival.
-    pub of: Vec<u32>,
+    /// See [`Clusters::place`] and [`Clusters::of`]: written in the order of clusters.
+    place: Vec<AtomicU32>,
+    of: Vec<AtomicU32>,
     /// Points at which it was looked for surfaces, to find areas.
     pub probes: u64,
     /// One for every cluster that is not empty, until the areas are known.
@@ -112,6 +112,16 @@ impl Numbered<'_> {
     pub fn get(&self, i: u32) -> Arrival {
         let i = i as usize;
         if i < self.camera.len() { self.camera.get(i) } else { self.light.get(i - self.camera.len()) }
+    }
+
+    /// Position and normal of arrival number `i`.
+    #[inline]
+    fn place(&self, i: u32) -> (Vec3, Vec3) {
+        let i = i as usize;
+        match i.checked_sub(self.camera.len()) {
+            None => self.camera.place(i),
+            Some(j) => self.light.place(j),
+        }
     }
 
     /// Instance of arrival number `i`, and triangle of its mesh.
@@ -162,48 +172,40 @@ impl Clusters {
         keys.par_sort_unstable();
         let counting = keys.partition_point(|k| k.0 != UNSEEN);
         let groups: Vec<&[(u64, u32)]> = keys[..counting].chunk_by(|a, b| a.0 == b.0).collect();
-        let hidden: Vec<bool> = groups
-            .par_iter()
-            .with_min_len(GRAIN)
-            .flat_map_iter(|group| {
-                let hub = Hub::new(grid, &all.get(group[0].1));
-                // the representative sees itself
-                let others = group[1..].iter().map(move |&(_, i)| {
-                    let a = all.get(i);
-                    !cut.is_raised() && hub.is_hidden(world, a.position, a.normal)
-                });
-                std::iter::once(false).chain(others)
-            })
-            .collect();
+        let parts: Vec<Layout> =
+            groups.par_chunks(GRAIN).map(|some| Layout::of(world, grid, all, some, cut)).collect();
         if cut.is_raised() {
             return false;
         }
-        let mut layout = Layout { cameras: all.camera.len() as u32, ..Layout::default() };
-        layout.order.reserve_exact(counting);
-        layout.clusters.reserve_exact(groups.len());
-        layout.pieces.reserve_exact(groups.len());
-        let mut at = 0;
-        for group in &groups {
-            let hidden = &hidden[at..at + group.len()];
-            at += group.len();
-            layout.add(group, hidden, all.get(group[0].1).class);
-        }
-        let nobodys = layout.clusters.len() as u32;
-        layout.clusters.extend((counting < n).then_some(Cluster::OF_NOBODY));
         let scratch = keys.capacity() * size_of::<(u64, u32)>()
             + groups.capacity() * size_of::<&[(u64, u32)]>()
-            + hidden.capacity();
+            + parts.iter().map(Layout::bytes).sum::<usize>();
         drop(groups);
-        drop((keys, hidden));
-        (self.order, self.clusters, self.pieces) = (layout.order, layout.clusters, layout.pieces);
-        self.most_bytes = scratch + self.bytes();
-        (self.place, self.of) = (vec![u32::MAX; n], vec![nobodys; n]);
-        for (c, cluster) in (0..).zip(&self.clusters) {
-            for place in cluster.first..cluster.first + cluster.cameras + cluster.lights {
-                let i = self.order[place as usize] as usize;
-                (self.place[i], self.of[i]) = (place, c);
-            }
+        drop(keys);
+        self.order.reserve_exact(counting);
+        self.clusters.reserve_exact(parts.iter().map(|p| p.clusters.len()).sum::<usize>() + 1);
+        self.pieces.reserve_exact(self.clusters.capacity());
+        for mut part in parts {
+            let before = self.order.len() as u32;
+            let clusters = part.clusters.into_iter();
+            self.clusters.extend(clusters.map(|c| Cluster { first: before + c.first, ..c }));
+            self.order.append(&mut part.order);
+            self.pieces.append(&mut part.pieces);
         }
+        let nobodys = self.clusters.len() as u32;
+        self.clusters.extend((counting < n).then_some(Cluster::OF_NOBODY));
+        self.most_bytes = scratch + self.bytes();
+        let all = |value: u32| (0..n).into_par_iter().map(move |_| AtomicU32::new(value)).collect();
+        (self.place, self.of) = (all(u32::MAX), all(nobodys));
+        let (order, place, of) = (&self.order, &self.place, &self.of);
+        let write = |(c, cluster): (usize, &Cluster)| {
+            for at in cluster.first..cluster.first + cluster.cameras + cluster.lights {
+                let i = order[at as usize] as usize;
+                place[i].store(at, Relaxed);
+                of[i].store(c as u32, Relaxed);
+            }
+        };
+        self.clusters.par_iter().with_min_len(GRAIN).enumerate().for_each(write);
         true
     }
 
@@ -221,6 +223,23 @@ impl Clusters {
         let clusters = self.clusters.par_iter_mut().zip(&pieces);
         self.probes = clusters.with_min_len(GRAIN).map(of_one).sum();
         !cut.is_raised()
+    }
+
+    /// Place in the order of arrival number `i`, which is in a cluster.
+    #[inline]
+    pub fn place(&self, i: usize) -> u32 {
+        self.place[i].load(Relaxed)
+    }
+
+    /// Cluster of arrival number `i`.
+    #[inline]
+    pub fn of(&self, i: usize) -> usize {
+        self.of[i].load(Relaxed) as usize
+    }
+
+    /// Arrivals, whether in a cluster or not.
+    pub fn arrivals(&self) -> usize {
+        self.of.len()
     }
 
     /// The most that was held while arrivals were grouped, bytes.
@@ -243,10 +262,11 @@ struct Hub {
 }
 
 impl Hub {
-    fn new(grid: &Grid, representative: &Arrival) -> Self {
-        let (_, edge) = grid.place(&grid.voxel(representative.position));
+    /// Above a position, on the side of this normal.
+    fn new(grid: &Grid, (position, normal): (Vec3, Vec3)) -> Self {
+        let (_, edge) = grid.place(&grid.voxel(position));
         let lift = LIFT * edge;
-        Self { point: representative.position + representative.normal * lift, lift }
+        Self { point: position + normal * lift, lift }
     }
 
     fn is_hidden(&self, world: &World, p: Vec3, normal: Vec3) -> bool {
@@ -254,7 +274,7 @@ impl Hub {
     }
 }
 
-/// The clusters as they are laid out one after the other.
+/// Some clusters as they are laid out one after the other.
 #[derive(Default)]
 struct Layout {
     /// Number of the camera's arrivals.
@@ -265,6 +285,36 @@ struct Layout {
 }
 
 impl Layout {
+    /// The clusters of these groups, each of which shares a key.
+    fn of(world: &World, grid: &Grid, all: Numbered, groups: &[&[(u64, u32)]], cut: &Cut) -> Self {
+        let members = groups.iter().copied().flatten();
+        // before any ray: they lie far apart in memory, and are fetched side by side
+        let places: Vec<(Vec3, Vec3)> = members.map(|&(_, i)| all.place(i)).collect();
+        let mut layout = Self { cameras: all.camera.len() as u32, ..Self::default() };
+        layout.order.reserve_exact(places.len());
+        layout.clusters.reserve_exact(groups.len());
+        layout.pieces.reserve_exact(groups.len());
+        let mut rest = &places[..];
+        let mut hidden = Vec::new();
+        for group in groups {
+            let (here, others) = rest.split_at(group.len());
+            rest = others;
+            let hub = Hub::new(grid, here[0]);
+            // the representative sees itself
+            hidden.clear();
+            hidden.push(false);
+            hidden.extend(here[1..].iter().map(|&(p, n)| !cut.is_raised() && hub.is_hidden(world, p, n)));
+            layout.add(group, &hidden, all.get(group[0].1).class);
+        }
+        layout
+    }
+
+    fn bytes(&self) -> usize {
+        self.order.capacity() * size_of::<u32>()
+            + self.clusters.capacity() * size_of::<Cluster>()
+            + self.pieces.capacity() * size_of::<Piece>()
+    }
+
     /// The clusters of what shares a key: one, or two where something stands between its points; each divided at
     /// random where its lobes are evaluated pair by pair. Each such part has its share of the area, as if
     /// the surface had been cut into interleaved pieces.
@@ -321,7 +371,7 @@ fn measure(
         return 0;
     }
     let cell = Cell { grid, voxel, representative: &representative, parted: piece.parted };
-    let hub = Hub::new(grid, &representative);
+    let hub = Hub::new(grid, (representative.position, representative.normal));
     let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.triangle(i)));
     let mut probes = 0;
     let mut estimate = |points: u32| {

@@ -38,7 +38,7 @@ impl Densities {
             }
             None => 0.0,
         };
-        let p_camera = w.densities[s.clusters.place[i] as usize].camera;
+        let p_camera = w.densities[s.clusters.place(i) as usize].camera;
         Self {
             camera: out.forward * p_camera / here.area,
             light: out.reverse * out.squeeze / end.area,
@@ -89,8 +89,8 @@ impl Segments {
     }
 
     fn reciprocal(s: Sampled, w: &Weights, i: usize) -> f32 {
-        let p_light = w.densities[s.clusters.place[i + 1] as usize].light;
-        let chance = s.bridges.map_or(0.0, |b| b.chances[s.clusters.of[i + 1] as usize]);
+        let p_light = w.densities[s.clusters.place(i + 1) as usize].light;
+        let chance = s.bridges.map_or(0.0, |b| b.chances[s.clusters.of(i + 1)]);
         reciprocal(Densities::of(s, w, i).all(p_light, chance))
     }
 
@@ -127,7 +127,7 @@ impl Segments {
 
 /// Factor on what a segment brings that makes it the own path's estimate of what arrival `i`, which it leaves, reflects.
 pub(super) fn along_path(s: Sampled, w: &Weights, i: usize) -> Vec3 {
-    let (cluster, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
+    let (cluster, place) = (s.clusters.of(i), s.clusters.place(i));
     let c = &s.clusters.clusters[cluster];
     let pdf = s.camera.outgoing.pdf(i);
     let (f, within) = match c.class {
@@ -158,7 +158,7 @@ pub(super) fn has_end(s: Sampled, i: usize) -> bool {
 /// Lights that the segment which leaves arrival `i` met, each with one over the density of all techniques, `1 / D_E`.
 fn met<'a>(s: Sampled<'a>, w: &Weights, i: usize) -> impl Iterator<Item = (EmissionHit, f32)> + use<'a> {
     let here = s.cluster_of(i);
-    let camera = w.densities[s.clusters.place[i] as usize].camera / here.area;
+    let camera = w.densities[s.clusters.place(i) as usize].camera / here.area;
     s.camera.hits.of(i).map(move |h| {
         let next_event = h.next_event_pdf * here.cameras as f32 / here.area;
         (h, reciprocal(h.forward * camera + next_event + h.light_density))
@@ -185,7 +185,7 @@ pub(super) fn emitted_share(s: Sampled, w: &Weights, i: usize) -> f32 {
 
 /// Next-event light, and the values of the segments that leave a cluster, reflected at its arrivals.
 pub(super) fn gather(s: Sampled, w: &Weights, values: &[SharedExponent], cut: &Cut) -> Vec<SharedExponent> {
-    let all = |i: usize, light: Vec3| SharedExponent::encode(light + w.direct(s.clusters.place[i]));
+    let all = |i: usize, light: Vec3| SharedExponent::encode(light + w.direct(s.clusters.place(i)));
     reflect(s, w, |i| values[i].decode(), all, cut)
 }
 
@@ -201,19 +201,19 @@ pub(super) fn reflect<T: Default + Send>(
     let shared =
         per_diffuse_cluster(s, cut, |c| s.cameras(c).map(arriving).sum::<DVec3>().as_vec3() / c.area);
     let of_others = |i: usize, c: &Cluster, apart: f32| {
-        let row = (s.clusters.place[i] - c.first) as usize;
+        let row = (s.clusters.place(i) - c.first) as usize;
         let gathered = Gathered::new(s, c, row);
         gathered.arrivals(s, c).map(arriving).sum::<DVec3>().as_vec3() * (apart / c.area)
     };
     per_arrival(s, cut, |i, k, c| {
         let light = match c.class {
             SurfaceClass::Diffuse => {
-                let apart = w.apart(s.clusters.place[i]);
+                let apart = w.apart(s.clusters.place(i));
                 let arriving = if apart == 1.0 { shared[k] } else { of_others(i, c, apart) };
                 s.camera.arrivals.reflectance(i) * arriving
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let f = w.row(k, (s.clusters.place[i] - c.first) as usize);
+                let f = w.row(k, (s.clusters.place(i) - c.first) as usize);
                 let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * value(i)).sum();
                 sum / c.area
             }
@@ -250,7 +250,7 @@ pub(super) fn per_arrival<T: Default + Send>(
         if cut.is_raised() {
             return T::default();
         }
-        let k = s.clusters.of[i] as usize;
+        let k = s.clusters.of(i);
         f(i, k, &s.clusters.clusters[k])
     };
     per_index(s, one)

@@ -110,8 +110,8 @@ fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
         if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons.bounces(j) >= most) {
             return 0.0;
         }
-        let place = s.clusters.place[cameras + j];
-        let k = s.clusters.of[cameras + j] as usize;
+        let place = s.clusters.place(cameras + j);
+        let k = s.clusters.of(cameras + j);
         let c = &s.clusters.clusters[k];
         let reflected = match c.class {
             SurfaceClass::Diffuse => shared[k] * s.light.arrivals.back_pdf(j),

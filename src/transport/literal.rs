@@ -39,7 +39,7 @@ impl Reflected {
         // without a limit a chain counts no more than a straight segment
         let sweeps_of = |passages: u32| if bounces.is_some() { passages } else { 0 };
         let chains = recursion.photons.iter().map(|p| p.passages).max().unwrap_or(0);
-        let start = vec![Vec3::ZERO; s.clusters.of.len()];
+        let start = vec![Vec3::ZERO; s.clusters.arrivals()];
         let mut levels = Levels::new(start, sweeps_of(chains.max(longest_chain(s, first))));
         let n = s.camera.arrivals.len();
         let nothing = || vec![SharedExponent::default(); n];
@@ -98,8 +98,8 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
             };
         };
         let before = j - 1;
-        let p_light = w.densities[s.clusters.place[n + before] as usize].light;
-        let p_camera = photon.camera_choices * w.densities[s.clusters.place[n + j] as usize].camera;
+        let p_light = w.densities[s.clusters.place(n + before) as usize].light;
+        let p_camera = photon.camera_choices * w.densities[s.clusters.place(n + j) as usize].camera;
         let light = light_choices * squeeze * p_light / s.cluster_of(n + before).area;
         LightSegment {
             emitted: Vec3::ZERO,
@@ -136,7 +136,7 @@ impl Recursion<'_> {
             }
             p.carry * read(n + j - 1, p.passages)
         };
-        let numbers = || (0..s.clusters.of.len()).into_par_iter().with_min_len(GRAIN);
+        let numbers = || (0..s.clusters.arrivals()).into_par_iter().with_min_len(GRAIN);
         let values: Vec<Vec3> = numbers().map(|i| if i < n { leaving(i) } else { brought(i - n) }).collect();
         let shared = per_diffuse_cluster(*s, cut, |c| {
             let cameras = s.cameras(c).map(|i| (values[i] * s.camera.outgoing.pdf(i)).as_dvec3());
@@ -147,7 +147,7 @@ impl Recursion<'_> {
             if cut.is_raised() || (i >= n && s.light.photons.pdf(i - n) <= 0.0) {
                 return Vec3::ZERO;
             }
-            let (k, place) = (s.clusters.of[i] as usize, s.clusters.place[i]);
+            let (k, place) = (s.clusters.of(i), s.clusters.place(i));
             let c = &s.clusters.clusters[k];
             let gathered = match c.class {
                 SurfaceClass::Diffuse => self.reflectance(i) * shared[k],

@@ -20,7 +20,7 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
     let i = s.camera.arrivals.len() + j;
     let c = s.cluster_of(i);
     let photon = s.light.photons.get(j);
-    let camera = photon.camera_choices * w.densities[s.clusters.place[i] as usize].camera / c.area;
+    let camera = photon.camera_choices * w.densities[s.clusters.place(i) as usize].camera / c.area;
     let (own, others) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
             let met = if is_delta { 0.0 } else { camera };
@@ -30,7 +30,7 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
         }
         Rivals::Later { light_choices, squeeze } => {
             let before = s.cluster_of(i - 1);
-            let p_light = w.densities[s.clusters.place[i - 1] as usize].light;
+            let p_light = w.densities[s.clusters.place(i - 1) as usize].light;
             let straight = photon.bounces == s.light.photons.bounces(j - 1) + 1;
             let bridged = s.bridges.filter(|_| straight).map_or(0.0, |b| {
                 let [x, y] = [j, j - 1].map(|j| s.light.arrivals.get(j));
@@ -113,7 +113,7 @@ pub(super) fn gather_photons(
     };
     let others = |j: usize| s.bridges.map_or_else(Others::default, |b| b.others[j]);
     let bridged = |i: usize| match s.bridges {
-        Some(b) if wanted(b.segments[i].bounces) => w.bridged[s.clusters.place[i] as usize],
+        Some(b) if wanted(b.segments[i].bounces) => w.bridged[s.clusters.place(i) as usize],
         _ => Vec3::ZERO,
     };
     let shared = per_diffuse_cluster(s, cut, |c| {
@@ -142,7 +142,7 @@ pub(super) fn gather_photons(
         if c.lights == 0 && s.bridges.is_none() {
             return SharedExponent::default();
         }
-        let place = s.clusters.place[i];
+        let place = s.clusters.place(i);
         let p_light = w.densities[place as usize].light;
         let approach = Approach::new(s, w, i, c);
         // factor on light of a photon whose path's part of `P_light` is `own`

@@ -135,7 +135,7 @@ impl Reflected {
                 if cut.is_raised() {
                     break;
                 }
-                let mut light = w.direct(s.clusters.place[i]);
+                let mut light = w.direct(s.clusters.place(i));
                 if s.camera.arrivals.goes_on(i) {
                     let end =
                         has_end(s, i).then(|| (tails[i + 1 - first].decode(), self.photons[i + 1].decode()));

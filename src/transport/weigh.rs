@@ -89,7 +89,7 @@ impl<'a> Sampled<'a> {
     /// Cluster of arrival number `i`.
     #[inline]
     pub fn cluster_of(&self, i: usize) -> &'a Cluster {
-        &self.clusters.clusters[self.clusters.of[i] as usize]
+        &self.clusters.clusters[self.clusters.of(i)]
     }
 
     /// Indices of the cluster's camera arrivals.

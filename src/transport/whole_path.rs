@@ -146,7 +146,7 @@ fn rests(s: Sampled, w: &Weights) -> Vec<Rest> {
 fn step(s: Sampled, w: &Weights, j: usize) -> Step {
     let i = s.camera.arrivals.len() + j;
     let (here, photon, a) = (s.cluster_of(i), s.light.photons.get(j), s.light.arrivals.get(j));
-    let p_camera = w.densities[s.clusters.place[i] as usize].camera;
+    let p_camera = w.densities[s.clusters.place(i) as usize].camera;
     let (met, next_event, own) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
             let met = if is_delta { 0.0 } else { photon.camera_choices };
@@ -154,7 +154,7 @@ fn step(s: Sampled, w: &Weights, j: usize) -> Step {
         }
         Rivals::Later { light_choices, squeeze } => {
             let before = s.cluster_of(i - 1);
-            let p_light = w.densities[s.clusters.place[i - 1] as usize].light;
+            let p_light = w.densities[s.clusters.place(i - 1) as usize].light;
             let own = light_choices * squeeze * mean(p_light, before.lights) / before.area;
             (photon.camera_choices, 0.0, own)
         }
@@ -215,20 +215,20 @@ impl WholePaths<'_> {
             return 1.0;
         }
         let (q, pdf) = reversed(self.s.world, &self.s.camera.arrivals.get(i), to);
-        let p_light = self.w.densities[self.s.clusters.place[i] as usize].light;
+        let p_light = self.w.densities[self.s.clusters.place(i) as usize].light;
         1.0 + at.back * mean(p_light + q * pdf, self.s.cluster_of(i).lights + 1)
     }
 
     /// Light of the arrival's next-event segment, reflected there and weighed.
     fn next_event(&self, i: usize, at: &Prefix) -> Vec3 {
         let Some(n) = self.s.camera.next_events.get(i) else { return Vec3::ZERO };
-        let value = self.w.towards_lights[self.s.clusters.place[i] as usize].value;
+        let value = self.w.towards_lights[self.s.clusters.place(i) as usize].value;
         value * n.light * (self.next_event_weight(i, &n, at) / n.next_event_pdf)
     }
 
     fn next_event_weight(&self, i: usize, n: &NextEvent, at: &Prefix) -> f32 {
         let c = self.s.cluster_of(i);
-        let p_camera = self.w.towards_lights[self.s.clusters.place[i] as usize].camera;
+        let p_camera = self.w.towards_lights[self.s.clusters.place(i) as usize].camera;
         let met = if n.is_delta { 0.0 } else { mean(p_camera, c.cameras) };
         let joins = n.light_density * self.near(i, at, n.direction);
         let own = n.next_event_pdf / c.area;
@@ -250,7 +250,7 @@ impl WholePaths<'_> {
     fn hit_weight(&self, hit: &EmissionHit, near: f32) -> f32 {
         let i = hit.arrival as usize;
         let c = self.s.cluster_of(i);
-        let p_camera = mean(self.w.densities[self.s.clusters.place[i] as usize].camera, c.cameras);
+        let p_camera = mean(self.w.densities[self.s.clusters.place(i) as usize].camera, c.cameras);
         let own = hit.forward * p_camera / c.area;
         own * reciprocal(own + hit.next_event_pdf / c.area + hit.light_density * near)
     }
@@ -273,8 +273,8 @@ impl WholePaths<'_> {
                 s.lights(c).for_each(|j| photon(j, reflectance * s.light.arrivals.back_pdf(j)));
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let row = (s.clusters.place[i] - c.first) as usize;
-                let values = &w.row(s.clusters.of[i] as usize, row)[c.cameras as usize..];
+                let row = (s.clusters.place(i) - c.first) as usize;
+                let values = &w.row(s.clusters.of(i), row)[c.cameras as usize..];
                 s.lights(c).zip(values).for_each(|(j, value)| photon(j, value.decode()));
             }
         }
@@ -282,7 +282,7 @@ impl WholePaths<'_> {
 
     /// `near` at an arrival where a photon is joined: the light's path has its own arrival in the cluster.
     fn joined_near(&self, i: usize, at: &Prefix) -> f32 {
-        let p_light = self.w.densities[self.s.clusters.place[i] as usize].light;
+        let p_light = self.w.densities[self.s.clusters.place(i) as usize].light;
         1.0 + at.back * mean(p_light, self.s.cluster_of(i).lights)
     }
 
@@ -307,12 +307,12 @@ impl WholePaths<'_> {
 
     /// Value of an arrival's lobes for the segment that leaves it.
     fn value_leaving(&self, i: usize) -> Vec3 {
-        let (s, cluster) = (self.s, self.s.clusters.of[i] as usize);
+        let (s, cluster) = (self.s, self.s.clusters.of(i));
         let c = &s.clusters.clusters[cluster];
         match c.class {
             SurfaceClass::Diffuse => s.camera.arrivals.reflectance(i) * s.camera.outgoing.get(i).pdf,
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let row = (s.clusters.place[i] - c.first) as usize;
+                let row = (s.clusters.place(i) - c.first) as usize;
                 self.w.row(cluster, row)[row].decode()
             }
         }

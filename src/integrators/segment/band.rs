@@ -246,9 +246,9 @@ impl Band {
         self.starts.reserve_exact(pixels);
         self.first_hits.reserve_exact(if wants_first_hits { pixels } else { 0 });
         let camera = &mut self.camera;
-        context.camera_rows(path, |rows| {
-            camera.reserve(rows.iter().map(|r| &r.0));
-            for (mut store, seen) in rows {
+        context.camera_paths(path, |made| {
+            camera.reserve(made.iter().map(|m| &m.0));
+            for (mut store, seen) in made {
                 let first = camera.append(&mut store);
                 for (mut p, first_hit) in seen {
                     p.arrival = p.arrival.map(|a| a + first);
@@ -278,16 +278,17 @@ impl Band {
             next_event: self.techniques.next_event,
             estimator: self.techniques.estimator,
         };
-        let path = |k: u32, store: &mut LightStore, rays: &mut u64| {
+        let path = |k: usize, store: &mut LightStore, rays: &mut u64| {
+            let k = k as u32;
             // Leaving one out takes light paths to be independent of each other. Stratified among each other, those of
             // an iteration are not: given one photon, fewer others lie nearby. They are from iteration to iteration.
             sampler.path(k, &mut Sampler::new(context.seed ^ LIGHT_STREAM, k, index), store, rays);
         };
         let light = &mut self.light;
         light.clear();
-        context.light_batches(paths, path, |batches| {
-            light.reserve(batches.iter());
-            batches.into_iter().for_each(|mut store| light.append(&mut store));
+        context.paths(paths as usize, path, |made| {
+            light.reserve(made.iter());
+            made.into_iter().for_each(|mut store| light.append(&mut store));
         });
         !cut.is_raised()
     }

@@ -156,16 +156,15 @@ impl Integrator for Vertices {
 
 impl Vertices {
     fn trace_light(&mut self, context: &Context, rules: &Rules, index: u32) {
-        let paths = rules.light_paths as u32;
         let wanted = |film| is_wanted(film, context.filter, context.crop);
-        let path = |k, store: &mut _, rays: &mut u64| {
+        let path = |k: usize, store: &mut _, rays: &mut u64| {
             // the paths of one iteration are stratified among each other
-            let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k);
+            let mut random = Sampler::new(context.seed ^ LIGHT_STREAM, index, k as u32);
             light::path(rules, &mut random, &wanted, store, rays);
         };
         self.light.clear();
-        context.light_batches(paths, path, |batches| {
-            batches.into_iter().for_each(|mut store| self.light.append(&mut store));
+        context.paths(rules.light_paths as usize, path, |made| {
+            made.into_iter().for_each(|mut store| self.light.append(&mut store));
         });
     }
 
@@ -185,7 +184,8 @@ impl Vertices {
             let mate = (pixel * paths / pixels) as usize;
             samples.push(sampler.path(&ray, &mut random, mate, rays));
         };
-        context.camera_rows(path, |rows| rows.into_iter().for_each(|mut row| self.samples.append(&mut row)));
+        context
+            .camera_paths(path, |made| made.into_iter().for_each(|mut some| self.samples.append(&mut some)));
     }
 
     /// One sample for every pixel.

@@ -87,17 +87,17 @@ fn the_weights_of_all_techniques_sum_to_one() {
             let n = camera.arrivals.len();
             let (start, end) = (s.cluster_of(i), s.cluster_of(i + 1));
             // parts of pairwise clusters are drawn at random, so the twins may have been parted
-            if clusters.of[n + i + 1] != clusters.of[i] || clusters.of[n + i] != clusters.of[i + 1] {
+            if clusters.of(n + i + 1) != clusters.of(i) || clusters.of(n + i) != clusters.of(i + 1) {
                 continue;
             }
-            let returns = clusters.of[n + i + 1] == clusters.of[n + i];
+            let returns = clusters.of(n + i + 1) == clusters.of(n + i);
             if returns && end.class != SurfaceClass::Diffuse {
                 continue;
             }
             let twin = if returns { light.arrivals.get(i + 1).survival } else { 0.0 };
             let own = (light.arrivals.get(i).survival + twin) * light.photons.get(i).pdf;
             let segment = Densities::of(s, &weights, i);
-            let p_light = weights.densities[clusters.place[i + 1] as usize].light;
+            let p_light = weights.densities[clusters.place(i + 1) as usize].light;
             // the light path itself is left out both ways, all of it
             let camera_weight = segment.camera / (segment.camera + segment.light * (p_light - own).max(0.0));
             let light_weight = photon_value(s, &weights, i + 1).x / start.inverse_area;
@@ -143,6 +143,6 @@ fn sums_over_ten_million_segments_are_as_good_as_in_double_precision() {
 
     let choices: f64 = camera.arrivals.iter().map(|a| f64::from(a.survival)).sum();
     let expected = choices * f64::from(camera.outgoing.pdf(0));
-    let got = f64::from(weights.densities[clusters.place[0] as usize].camera);
+    let got = f64::from(weights.densities[clusters.place(0) as usize].camera);
     assert!((got / expected - 1.0).abs() < 1e-5, "{got}, not {expected}");
 }

@@ -166,6 +166,12 @@ impl Arrivals {
         self.0[i].position
     }
 
+    /// See [`Arrival::position`] and [`Arrival::normal`].
+    #[inline]
+    pub fn place(&self, i: usize) -> (Vec3, Vec3) {
+        (self.0[i].position, self.0[i].normal.decode())
+    }
+
     /// See [`Arrival::reflectance`].
     #[inline]
     pub fn reflectance(&self, i: usize) -> Vec3 {

@@ -152,7 +152,7 @@ fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Tec
     match technique {
         Technique::Join(_) => {
             let j = light.arrivals.len() - 1;
-            assert_eq!(clusters.of[last], clusters.of[camera.arrivals.len() + j]);
+            assert_eq!(clusters.of(last), clusters.of(camera.arrivals.len() + j));
             assert_eq!(j - photons, ARRIVALS - joined);
             paths.join_weight(j, &at, paths.joined_near(last, &at))
         }
