@@ -237,6 +237,12 @@ impl Clusters {
         self.of[i].load(Relaxed) as usize
     }
 
+    /// What the first `count` arrivals have at their places; nothing for those in no cluster.
+    pub fn by_number<T: Copy + Default + Send + Sync>(&self, placed: &[T], count: usize) -> Vec<T> {
+        let one = |i| placed.get(self.place(i) as usize).copied().unwrap_or_default();
+        (0..count).into_par_iter().map(one).collect()
+    }
+
     /// Arrivals, whether in a cluster or not.
     pub fn arrivals(&self) -> usize {
         self.of.len()

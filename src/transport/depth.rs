@@ -6,7 +6,7 @@
 //! with `m` of them reads what its end reflected `m` sweeps before.
 
 use super::Cut;
-use super::exchange::{Segments, emitted, gather, has_end, per_index};
+use super::exchange::{Segments, emitted, gather, has_end, offers};
 use super::photons::{gather_photons, photon_values};
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
@@ -72,15 +72,15 @@ impl Reflected {
             if cut.is_raised() {
                 return false;
             }
-            let brought = per_index(s, |i| {
+            let offers = offers(s, |i| {
                 // light met after k passages has bounced once more on its way
                 let met = emitted(s, w, i, Some(k - 1));
                 let level = levels.back(s.camera.outgoing.passages(i)).filter(|_| has_end(s, i));
                 let end = level.map(|l| (l.carried[i + 1].decode(), l.photons[i + 1].decode()));
-                SharedExponent::encode(self.segments.value(s, i, met, end))
+                self.segments.value(s, i, met, end)
             });
             let photons = gather_photons(s, w, &values, cut, |bounces| bounces < k);
-            let carried = gather(s, w, &brought, cut);
+            let carried = gather(s, w, &offers, cut);
             if k == 1 {
                 self.direct.clone_from(&carried);
                 self.add_direct_photons(s, &photons);

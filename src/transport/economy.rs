@@ -293,7 +293,7 @@ fn draws(o: Outcome, i: usize) -> Draws {
     }
     draws.emitted = Item { light: segments.emitted(i) / c.area, share: emitted_share(s, w, i) };
     if has_end(s, i) {
-        let p_light = w.densities[s.clusters.place(i + 1) as usize].light.max(0.0);
+        let p_light = w.densities[i + 1].light.max(0.0);
         let light = segments.value(s, i, Vec3::ZERO, Some(o.reflected.end_of(i))) / c.area;
         let densities = Densities::of(s, w, i);
         let by_light = densities.light * p_light;

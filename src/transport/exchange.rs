@@ -20,7 +20,7 @@ pub(super) const GRAIN: usize = 512;
 pub(super) struct Densities {
     /// That of the camera's: `c P_cam / A_x`.
     pub camera: f32,
-    /// Factor on `P_light` that makes it the density of the light's techniques: `c / (A_y n_rel^2)`.
+    /// Factor on `P_light / A_y` that makes it the density of the light's techniques: `c / n_rel^2`.
     pub light: f32,
     /// Density of bridges along it, were its end's cluster chosen with certainty.
     pub bridge: f32,
@@ -29,24 +29,18 @@ pub(super) struct Densities {
 impl Densities {
     /// Of the segment that leaves arrival `i`, which has an end.
     pub fn of(s: Sampled, w: &Weights, i: usize) -> Self {
-        let (here, end) = (s.cluster_of(i), s.cluster_of(i + 1));
         let out = s.camera.outgoing.get(i);
         let bridge = match s.bridges.filter(|_| out.passages == 0) {
             Some(_) => {
                 let [a, b] = [i, i + 1].map(|i| s.camera.arrivals.get(i));
-                Bridges::density(s, &a, here, &b, end)
+                Bridges::density(s, &a, s.cluster_of(i), &b, s.cluster_of(i + 1))
             }
             None => 0.0,
         };
-        let p_camera = w.densities[s.clusters.place(i) as usize].camera;
-        Self {
-            camera: out.forward * p_camera / here.area,
-            light: out.reverse * out.squeeze / end.area,
-            bridge,
-        }
+        Self { camera: out.forward * w.densities[i].camera, light: out.reverse * out.squeeze, bridge }
     }
 
-    /// Density of all techniques: `p_light` and `chance` of its end's cluster.
+    /// Density of all techniques: `p_light`, over the area, and `chance` of its end's cluster.
     pub fn all(&self, p_light: f32, chance: f32) -> f32 {
         self.camera + self.light * p_light.max(0.0) + self.bridge * chance
     }
@@ -89,7 +83,7 @@ impl Segments {
     }
 
     fn reciprocal(s: Sampled, w: &Weights, i: usize) -> f32 {
-        let p_light = w.densities[s.clusters.place(i + 1) as usize].light;
+        let p_light = w.densities[i + 1].light;
         let chance = s.bridges.map_or(0.0, |b| b.chances[s.clusters.of(i + 1)]);
         reciprocal(Densities::of(s, w, i).all(p_light, chance))
     }
@@ -127,20 +121,17 @@ impl Segments {
 
 /// Factor on what a segment brings that makes it the own path's estimate of what arrival `i`, which it leaves, reflects.
 pub(super) fn along_path(s: Sampled, w: &Weights, i: usize) -> Vec3 {
-    let (cluster, place) = (s.clusters.of(i), s.clusters.place(i));
-    let c = &s.clusters.clusters[cluster];
     let pdf = s.camera.outgoing.pdf(i);
-    let (f, within) = match c.class {
+    let (f, within) = match s.camera.arrivals.class(i) {
         SurfaceClass::Diffuse => (s.camera.arrivals.reflectance(i) * pdf, 1.0),
         // paired values have it within
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-            let row = (place - c.first) as usize;
-            (w.row(cluster, row)[row].decode(), w.apart(place))
+            let cluster = s.clusters.of(i);
+            let row = (s.clusters.place(i) - s.clusters.clusters[cluster].first) as usize;
+            (w.row(cluster, row)[row].decode(), w.apart(i))
         }
     };
-    let continuation =
-        w.densities[place as usize].camera * reciprocal(s.camera.arrivals.survival(i) * pdf * within);
-    f * (continuation / c.area)
+    f * (w.densities[i].camera * reciprocal(s.camera.arrivals.survival(i) * pdf * within))
 }
 
 /// One over a density; zero where there is none, or so little that nothing can have come of it.
@@ -158,7 +149,7 @@ pub(super) fn has_end(s: Sampled, i: usize) -> bool {
 /// Lights that the segment which leaves arrival `i` met, each with one over the density of all techniques, `1 / D_E`.
 fn met<'a>(s: Sampled<'a>, w: &Weights, i: usize) -> impl Iterator<Item = (EmissionHit, f32)> + use<'a> {
     let here = s.cluster_of(i);
-    let camera = w.densities[s.clusters.place(i) as usize].camera / here.area;
+    let camera = w.densities[i].camera;
     s.camera.hits.of(i).map(move |h| {
         let next_event = h.next_event_pdf * here.cameras as f32 / here.area;
         (h, reciprocal(h.forward * camera + next_event + h.light_density))
@@ -183,21 +174,36 @@ pub(super) fn emitted_share(s: Sampled, w: &Weights, i: usize) -> f32 {
     if all > 0.0 { by_light / all } else { 0.0 }
 }
 
-/// Next-event light, and the values of the segments that leave a cluster, reflected at its arrivals.
-pub(super) fn gather(s: Sampled, w: &Weights, values: &[SharedExponent], cut: &Cut) -> Vec<SharedExponent> {
-    let all = |i: usize, light: Vec3| SharedExponent::encode(light + w.direct(s.clusters.place(i)));
-    reflect(s, w, |i| values[i].decode(), all, cut)
+/// What the segment that leaves arrival `i` offers to its cluster, if it brings `value`: times its density where lobes are
+/// diffuse, since that is the same for all of them. Those of other lobes are within their values.
+#[inline]
+pub(super) fn offer(s: Sampled, i: usize, value: Vec3) -> Vec3 {
+    match s.camera.arrivals.class(i) {
+        SurfaceClass::Diffuse => value * s.camera.outgoing.pdf(i),
+        SurfaceClass::Reflecting | SurfaceClass::Transmitting => value,
+    }
 }
 
-/// What arrivals reflect of the values of the segments that leave their clusters; `keep` makes of it what is stored.
+/// What the segments that leave all arrivals offer, if they bring `value`.
+pub(super) fn offers(s: Sampled, value: impl Fn(usize) -> Vec3 + Sync + Send) -> Vec<SharedExponent> {
+    per_index(s, |i| SharedExponent::encode(offer(s, i, value(i))))
+}
+
+/// Next-event light, and what the segments that leave a cluster offer, reflected at its arrivals.
+pub(super) fn gather(s: Sampled, w: &Weights, offers: &[SharedExponent], cut: &Cut) -> Vec<SharedExponent> {
+    let all = |i: usize, light: Vec3| SharedExponent::encode(light + w.direct(i));
+    reflect(s, w, |i| offers[i].decode(), all, cut)
+}
+
+/// What arrivals reflect of what the segments that leave their clusters offer; `keep` makes of it what is stored.
 pub(super) fn reflect<T: Default + Send>(
     s: Sampled,
     w: &Weights,
-    value: impl Fn(usize) -> Vec3 + Sync,
+    offer: impl Fn(usize) -> Vec3 + Sync,
     keep: impl Fn(usize, Vec3) -> T + Sync,
     cut: &Cut,
 ) -> Vec<T> {
-    let arriving = |i: usize| (value(i) * s.camera.outgoing.pdf(i)).as_dvec3();
+    let arriving = |i: usize| offer(i).as_dvec3();
     let shared =
         per_diffuse_cluster(s, cut, |c| s.cameras(c).map(arriving).sum::<DVec3>().as_vec3() / c.area);
     let of_others = |i: usize, c: &Cluster, apart: f32| {
@@ -208,13 +214,13 @@ pub(super) fn reflect<T: Default + Send>(
     per_arrival(s, cut, |i, k, c| {
         let light = match c.class {
             SurfaceClass::Diffuse => {
-                let apart = w.apart(s.clusters.place(i));
+                let apart = w.apart(i);
                 let arriving = if apart == 1.0 { shared[k] } else { of_others(i, c, apart) };
                 s.camera.arrivals.reflectance(i) * arriving
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                 let f = w.row(k, (s.clusters.place(i) - c.first) as usize);
-                let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * value(i)).sum();
+                let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * offer(i)).sum();
                 sum / c.area
             }
         };

@@ -98,12 +98,11 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
             };
         };
         let before = j - 1;
-        let p_light = w.densities[s.clusters.place(n + before) as usize].light;
-        let p_camera = photon.camera_choices * w.densities[s.clusters.place(n + j) as usize].camera;
-        let light = light_choices * squeeze * p_light / s.cluster_of(n + before).area;
+        let light = light_choices * squeeze * w.densities[n + before].light;
+        let camera = photon.camera_choices * w.densities[n + j].camera;
         LightSegment {
             emitted: Vec3::ZERO,
-            carry: carry.throughput * reciprocal(light + p_camera / s.cluster_of(n + j).area),
+            carry: carry.throughput * reciprocal(light + camera),
             passages: photon.bounces.saturating_sub(s.light.photons.bounces(before) + 1),
         }
     };
@@ -163,7 +162,7 @@ impl Recursion<'_> {
                     (cameras + lights.sum::<Vec3>()) / c.area
                 }
             };
-            w.direct(place) + gathered
+            w.direct(i) + gathered
         };
         numbers().map(reflected).collect()
     }

@@ -74,7 +74,7 @@ pub struct Techniques {
     pub bridges: Option<bridge::Choice>,
     /// Whether light paths learn where to begin.
     pub emission_guiding: bool,
-    /// What the segments of camera paths may take at a time, about, bytes: larger pictures are made in bands.
+    /// What the segments of an iteration may take at a time, about, bytes: larger pictures are made in bands.
     pub memory_budget: u64,
 }
 
@@ -95,7 +95,7 @@ impl Default for Techniques {
             camera_paths: true,
             bridges: None,
             emission_guiding: true,
-            memory_budget: 1 << 30,
+            memory_budget: 768 << 20,
         }
     }
 }

@@ -2,7 +2,7 @@
 //! whether light could grow without bound, and how many sweeps are needed from which start.
 
 use super::Cut;
-use super::exchange::{has_end, per_index, reflect};
+use super::exchange::{has_end, offer, per_index, reflect};
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
 use crate::math::SharedExponent;
@@ -61,11 +61,11 @@ impl Reflected {
         // logarithms over that of the first moment: of the light now, after half of the sweeps, and the most
         let (mut now, mut half, mut peak) = (0.0_f64, 0.0, f64::NEG_INFINITY);
         for sweep in 1..=count {
-            let brought = per_index(s, |i| match has_end(s, i) {
-                true => self.segments.carry(s, i) * light[i + 1],
+            let offers = per_index(s, |i| match has_end(s, i) {
+                true => offer(s, i, self.segments.carry(s, i) * light[i + 1]),
                 false => Vec3::ZERO,
             });
-            light = reflect(s, w, |i| brought[i], |_, light| light, cut);
+            light = reflect(s, w, |i| offers[i], |_, light| light, cut);
             let left = norm(&light) / first;
             // what is left is not told from nothing
             if left < f64::from(f32::MIN_POSITIVE) || cut.is_raised() {

@@ -20,7 +20,7 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
     let i = s.camera.arrivals.len() + j;
     let c = s.cluster_of(i);
     let photon = s.light.photons.get(j);
-    let camera = photon.camera_choices * w.densities[s.clusters.place(i) as usize].camera / c.area;
+    let camera = photon.camera_choices * w.densities[i].camera;
     let (own, others) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
             let met = if is_delta { 0.0 } else { camera };
@@ -29,14 +29,12 @@ pub(super) fn photon_weight(s: Sampled, w: &Weights, j: usize) -> f32 {
             (light_density, if others.is_nan() { f32::INFINITY } else { others })
         }
         Rivals::Later { light_choices, squeeze } => {
-            let before = s.cluster_of(i - 1);
-            let p_light = w.densities[s.clusters.place(i - 1) as usize].light;
             let straight = photon.bounces == s.light.photons.bounces(j - 1) + 1;
             let bridged = s.bridges.filter(|_| straight).map_or(0.0, |b| {
                 let [x, y] = [j, j - 1].map(|j| s.light.arrivals.get(j));
-                b.others[j - 1].chance * Bridges::density(s, &x, c, &y, before)
+                b.others[j - 1].chance * Bridges::density(s, &x, c, &y, s.cluster_of(i - 1))
             });
-            (light_choices * squeeze * p_light / before.area, camera + bridged)
+            (light_choices * squeeze * w.densities[i - 1].light, camera + bridged)
         }
     };
     // with no photon to compare with, the camera has it all; with no camera path either, this one has
@@ -143,11 +141,11 @@ pub(super) fn gather_photons(
             return SharedExponent::default();
         }
         let place = s.clusters.place(i);
-        let p_light = w.densities[place as usize].light;
+        let p_light = w.densities[i].light;
         let approach = Approach::new(s, w, i, c);
         // factor on light of a photon whose path's part of `P_light` is `own`
         let carry = |own: f32, others: Others| match &approach {
-            Some(a) => a.carry(p_light - own, others),
+            Some(a) => a.carry(p_light - own / c.area, others),
             None => Vec3::ONE,
         };
         let mut sum = Vec3::ZERO;

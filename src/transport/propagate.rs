@@ -4,7 +4,7 @@
 //! constant (`photons`); only the reflected radiance of camera segments is unknown.
 
 use super::Cut;
-use super::exchange::{GRAIN, Segments, along_path, emitted, gather, has_end, per_index};
+use super::exchange::{GRAIN, Segments, along_path, emitted, gather, has_end, offers};
 use super::photons::{gather_photons, photon_values, towards_camera};
 use super::weigh::{Sampled, Weights};
 use crate::math::{SharedExponent, luminance};
@@ -65,7 +65,7 @@ impl Reflected {
         }
         self.direct.clear();
         if wants_direct {
-            let straight = per_index(s, |i| SharedExponent::encode(emitted(s, w, i, Some(0))));
+            let straight = offers(s, |i| emitted(s, w, i, Some(0)));
             let first = gather_photons(s, w, &values, cut, |bounces| bounces == 0);
             self.direct = gather(s, w, &straight, cut);
             self.add_direct_photons(s, &first);
@@ -81,12 +81,12 @@ impl Reflected {
         carried: Vec<SharedExponent>,
         cut: &Cut,
     ) -> Vec<SharedExponent> {
-        let brought = per_index(s, |i| {
+        let offers = offers(s, |i| {
             let end = has_end(s, i).then(|| (carried[i + 1].decode(), self.photons[i + 1].decode()));
-            SharedExponent::encode(self.segments.value(s, i, self.segments.emitted(i), end))
+            self.segments.value(s, i, self.segments.emitted(i), end)
         });
         drop(carried);
-        gather(s, w, &brought, cut)
+        gather(s, w, &offers, cut)
     }
 
     /// Adds what first arrivals reflect of `photons` to the light that was scattered nowhere else.
@@ -135,7 +135,7 @@ impl Reflected {
                 if cut.is_raised() {
                     break;
                 }
-                let mut light = w.direct(s.clusters.place(i));
+                let mut light = w.direct(i);
                 if s.camera.arrivals.goes_on(i) {
                     let end =
                         has_end(s, i).then(|| (tails[i + 1 - first].decode(), self.photons[i + 1].decode()));

@@ -2,7 +2,7 @@
 //! operator feeds back. Its spectral radius is at most its largest row sum.
 
 use super::Cut;
-use super::exchange::{Segments, reflect};
+use super::exchange::{Segments, offer, reflect};
 use super::operator::Sweeps;
 use super::propagate::Reflected;
 use super::weigh::{Sampled, Weights};
@@ -58,7 +58,7 @@ fn sizes(s: Sampled) -> (Vec<u64>, u32) {
 }
 
 fn row_sums(s: Sampled, w: &Weights, constants: &Segments, cut: &Cut) -> RowSums {
-    let sums = reflect(s, w, |i| constants.carry(s, i), |_, sum| sum.max_element(), cut);
+    let sums = reflect(s, w, |i| offer(s, i, constants.carry(s, i)), |_, sum| sum.max_element(), cut);
     let mut found = RowSums { least: f32::INFINITY, ..RowSums::default() };
     for &sum in &sums {
         found.least = found.least.min(sum);

@@ -17,7 +17,7 @@ use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Densities of one arrival.
+/// Densities of one arrival, over the area of its cluster.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Density {
     /// `P_cam` of the segment that leaves a camera arrival, or that brought a light arrival.
@@ -47,10 +47,10 @@ struct Matrix {
     lights: u32,
 }
 
-/// Densities of an iteration. The arrays follow the order of the clusters.
+/// Densities of an iteration. But for the first, [`Weights::direct`] and [`Weights::apart`] the arrays follow the order of the clusters.
 #[derive(Debug, Default)]
 pub struct Weights {
-    /// One for every arrival.
+    /// One for every arrival, by number; zero where nobody asks.
     pub densities: Vec<Density>,
     /// Irradiance, weighed, from the bridge of every camera arrival; empty without any.
     pub bridged: Vec<Vec3>,
@@ -160,14 +160,10 @@ impl Weights {
         // the lobes' values are most of the memory: not twice
         self.values.clear();
         self.owns.clear();
-        self.densities.clear();
-        self.direct.clear();
         let places = s.clusters.order.len();
-        self.densities.reserve_exact(places);
-        self.densities.resize(places, Density::default());
-        self.direct.reserve_exact(places);
-        self.direct.resize(places, SharedExponent::default());
-        let (mut densities, mut direct) = (&mut self.densities[..], &mut self.direct[..]);
+        let mut all_densities = vec![Density::default(); places];
+        let mut all_direct = vec![SharedExponent::default(); places];
+        let (mut densities, mut direct) = (&mut all_densities[..], &mut all_direct[..]);
         let mut jobs = Vec::new();
         for clusters in s.clusters.clusters.chunks(BATCH) {
             let arrivals = clusters.iter().map(|c| (c.cameras + c.lights) as usize).sum();
@@ -182,40 +178,51 @@ impl Weights {
         if cut.is_raised() {
             return false;
         }
+        // by number, which is how most of what follows goes through them
+        self.densities = s.clusters.by_number(&all_densities, s.clusters.arrivals());
+        drop(all_densities);
+        let lit = match estimator {
+            Estimator::Literal => s.clusters.arrivals(),
+            Estimator::LeaveOneOut | Estimator::WholePath => s.camera.arrivals.len(),
+        };
+        self.direct = s.clusters.by_number(&all_direct, lit);
+        drop(all_direct);
         self.bridged.clear();
         self.towards_lights.clear();
+        let mut apart: Vec<(u32, f32)> = batches.iter().flat_map(|b| b.apart.iter().copied()).collect();
+        apart.par_sort_unstable_by_key(|a| a.0);
         self.apart.clear();
-        self.apart.reserve(places, batches.iter().map(|b| b.apart.len()).sum());
+        self.apart.reserve(s.camera.arrivals.len(), apart.len());
+        for (i, apart) in apart {
+            (self.apart.len() as u32..i).for_each(|_| self.apart.push(None));
+            self.apart.push(Some(apart));
+        }
+        (self.apart.len()..s.camera.arrivals.len()).for_each(|_| self.apart.push(None));
         self.matrices.clear();
         let matrices = batches.iter().map(|b| b.matrices.count()).sum();
         self.matrices.reserve(s.clusters.clusters.len(), matrices);
         for mut batch in batches {
-            for (place, apart) in batch.apart {
-                (self.apart.len() as u32..place).for_each(|_| self.apart.push(None));
-                self.apart.push(Some(apart));
-            }
             self.bridged.extend(batch.bridged);
             self.towards_lights.extend(batch.towards_lights);
             self.matrices.append(&mut batch.matrices);
             self.values.push(batch.values);
             self.owns.push(batch.owns);
         }
-        (self.apart.len()..places).for_each(|_| self.apart.push(None));
         true
     }
 
-    /// Basic radiance from next-event segments, reflected at the camera arrival at a place; at a light arrival, for
-    /// the literal recursion, towards where its path goes on.
+    /// Basic radiance from next-event segments, reflected at camera arrival `i`; at a light arrival, for the literal
+    /// recursion, towards where its path goes on.
     #[inline]
-    pub fn direct(&self, place: u32) -> Vec3 {
-        self.direct[place as usize].decode()
+    pub fn direct(&self, i: usize) -> Vec3 {
+        self.direct[i].decode()
     }
 
-    /// `P_cam` of the segment that leaves the camera arrival at a place, over the same without the part of its path's
-    /// other arrivals; one where it has none, or nobody leaves them out.
+    /// `P_cam` of the segment that leaves camera arrival `i`, over the same without the part of its path's other arrivals;
+    /// one where it has none, or nobody leaves them out.
     #[inline]
-    pub fn apart(&self, place: u32) -> f32 {
-        self.apart.get(place as usize).copied().unwrap_or(1.0)
+    pub fn apart(&self, i: usize) -> f32 {
+        self.apart.get(i).copied().unwrap_or(1.0)
     }
 
     /// Values of the lobes of the `row`-th arrival of a cluster that is not diffuse: a camera's, unless the literal
@@ -285,7 +292,10 @@ impl Batch {
                     paired::weigh(s, c, estimator, &mut places, &mut batch);
                 }
             }
-            let apart = (c.first..).zip(places.apart);
+            for d in places.densities {
+                *d = Density { camera: d.camera / c.area, light: d.light / c.area };
+            }
+            let apart = s.cameras(c).map(|i| i as u32).zip(places.apart);
             batch.apart.extend(apart.filter(|&(_, apart)| apart != 1.0));
         }
         batch

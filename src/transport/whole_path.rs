@@ -146,16 +146,15 @@ fn rests(s: Sampled, w: &Weights) -> Vec<Rest> {
 fn step(s: Sampled, w: &Weights, j: usize) -> Step {
     let i = s.camera.arrivals.len() + j;
     let (here, photon, a) = (s.cluster_of(i), s.light.photons.get(j), s.light.arrivals.get(j));
-    let p_camera = w.densities[s.clusters.place(i) as usize].camera;
+    let p_camera = w.densities[i].camera * here.area;
     let (met, next_event, own) = match photon.rivals {
         Rivals::First { light_density, next_event_pdf, is_delta } => {
             let met = if is_delta { 0.0 } else { photon.camera_choices };
             (met, next_event_pdf, light_density)
         }
         Rivals::Later { light_choices, squeeze } => {
-            let before = s.cluster_of(i - 1);
-            let p_light = w.densities[s.clusters.place(i - 1) as usize].light;
-            let own = light_choices * squeeze * mean(p_light, before.lights) / before.area;
+            let p_light = w.densities[i - 1].light;
+            let own = light_choices * squeeze * mean(p_light, s.cluster_of(i - 1).lights);
             (photon.camera_choices, 0.0, own)
         }
     };
@@ -215,8 +214,8 @@ impl WholePaths<'_> {
             return 1.0;
         }
         let (q, pdf) = reversed(self.s.world, &self.s.camera.arrivals.get(i), to);
-        let p_light = self.w.densities[self.s.clusters.place(i) as usize].light;
-        1.0 + at.back * mean(p_light + q * pdf, self.s.cluster_of(i).lights + 1)
+        let c = self.s.cluster_of(i);
+        1.0 + at.back * mean(self.w.densities[i].light + q * pdf / c.area, c.lights + 1)
     }
 
     /// Light of the arrival's next-event segment, reflected there and weighed.
@@ -250,8 +249,7 @@ impl WholePaths<'_> {
     fn hit_weight(&self, hit: &EmissionHit, near: f32) -> f32 {
         let i = hit.arrival as usize;
         let c = self.s.cluster_of(i);
-        let p_camera = mean(self.w.densities[self.s.clusters.place(i) as usize].camera, c.cameras);
-        let own = hit.forward * p_camera / c.area;
+        let own = hit.forward * mean(self.w.densities[i].camera, c.cameras);
         own * reciprocal(own + hit.next_event_pdf / c.area + hit.light_density * near)
     }
 
@@ -282,8 +280,7 @@ impl WholePaths<'_> {
 
     /// `near` at an arrival where a photon is joined: the light's path has its own arrival in the cluster.
     fn joined_near(&self, i: usize, at: &Prefix) -> f32 {
-        let p_light = self.w.densities[self.s.clusters.place(i) as usize].light;
-        1.0 + at.back * mean(p_light, self.s.cluster_of(i).lights)
+        1.0 + at.back * mean(self.w.densities[i].light, self.s.cluster_of(i).lights)
     }
 
     fn join_weight(&self, j: usize, at: &Prefix, near: f32) -> f32 {

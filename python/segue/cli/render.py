@@ -68,7 +68,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--memory-budget",
         type=arguments.count,
         metavar="MIB",
-        help="what the segments of camera paths may take at a time, about (default: 1024); larger "
+        help="what the segments of an iteration may take at a time, about (default: 768); larger "
         "pictures are made in bands, which takes longer",
     )
     add(

@@ -5,7 +5,7 @@ use crate::film::{FirstHit, Pass, Rect, Sample, SplatBuffer};
 use crate::integrators::{Context, StageCosts, locked};
 use crate::math::Sampler;
 use crate::math::sampler::hash;
-use crate::shading::World;
+use crate::shading::{SurfaceClass, World};
 use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
 use crate::transport::cluster::{Areas, Clusters, Numbered};
@@ -28,8 +28,26 @@ const GRID_STREAM: u32 = 0x961d_0000;
 /// Keeps those of bridges apart.
 const BRIDGE_STREAM: u32 = 0xb21d_9e00;
 
-/// Camera paths by which it is found how long they are.
+/// Camera paths, and light paths, by which it is found how long they are.
 const PILOTS: usize = 256;
+
+/// Arrivals of a path, on average.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Lengths {
+    /// Of a camera path, on diffuse surfaces.
+    pub diffuse: f32,
+    /// Of a camera path, on others.
+    pub other: f32,
+    /// Of a light path.
+    pub light: f32,
+}
+
+/// The random numbers of a light path.
+fn light_random(context: &Context, path: u32, index: u32) -> Sampler {
+    // Leaving one out takes light paths to be independent of each other. Stratified among each other, those of
+    // an iteration are not: given one photon, fewer others lie nearby. They are from iteration to iteration.
+    Sampler::new(context.seed ^ LIGHT_STREAM, path, index)
+}
 
 /// What is sampled of a band, how it is clustered, and what comes of it. The light paths are those of all bands.
 #[derive(Debug, Default)]
@@ -199,20 +217,38 @@ impl Band {
         }
     }
 
-    /// Arrivals of a camera path, on average over some pixels of the picture.
-    pub fn mean_arrivals(&self, context: &Context, learnt: &Learnt) -> f32 {
-        // where they end after one arrival, light paths do not
-        let sampler = CameraSampler { goes_on: true, ..self.camera_sampler(context, learnt, 0.0) };
+    /// How long some paths are.
+    pub fn lengths(&self, context: &Context, learnt: &Learnt) -> Lengths {
+        let sampler = self.camera_sampler(context, learnt, 0.0);
         let (width, area) = (context.crop.width as usize, context.crop.area());
-        let arrivals = |pixel: usize| {
+        let pixels: Vec<usize> = (0..area).step_by(area.div_ceil(PILOTS)).collect();
+        let of_camera = |&pixel: &usize| {
             let (ray, mut random) = context.camera_sample((pixel % width) as u32, (pixel / width) as u32, 0);
             let mut store = CameraStore::default();
             sampler.path(&ray, &mut random, &mut store, &mut 0);
+            let diffuse = store.arrivals.iter().filter(|a| a.class == SurfaceClass::Diffuse).count();
+            [diffuse, store.arrivals.len() - diffuse]
+        };
+        let sampler = self.light_sampler(context, learnt, PILOTS as f32);
+        let of_light = |k: u32| {
+            let mut store = LightStore::default();
+            sampler.path(k, &mut light_random(context, k, 0), &mut store, &mut 0);
             store.arrivals.len()
         };
-        let pixels: Vec<usize> = (0..area).step_by(area.div_ceil(PILOTS)).collect();
-        let count: usize = pixels.par_iter().map(|&pixel| arrivals(pixel)).sum();
-        count as f32 / pixels.len() as f32
+        let camera = pixels.par_iter().map(of_camera).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        let light: usize = (0..PILOTS as u32).into_par_iter().map(of_light).sum();
+        let [diffuse, other] = camera.map(|count| count as f32 / pixels.len() as f32);
+        Lengths { diffuse, other, light: light as f32 / PILOTS as f32 }
+    }
+
+    fn light_sampler<'a>(&self, context: &'a Context, learnt: &'a Learnt, paths: f32) -> LightSampler<'a> {
+        LightSampler {
+            world: context.world,
+            guide: &learnt.guiding.guide,
+            paths,
+            next_event: self.techniques.next_event,
+            estimator: self.techniques.estimator,
+        }
     }
 
     fn sample_camera(
@@ -271,18 +307,9 @@ impl Band {
         cut: &Cut,
     ) -> bool {
         self.forget();
-        let sampler = LightSampler {
-            world: context.world,
-            guide: &learnt.guiding.guide,
-            paths: paths as f32,
-            next_event: self.techniques.next_event,
-            estimator: self.techniques.estimator,
-        };
+        let sampler = self.light_sampler(context, learnt, paths as f32);
         let path = |k: usize, store: &mut LightStore, rays: &mut u64| {
-            let k = k as u32;
-            // Leaving one out takes light paths to be independent of each other. Stratified among each other, those of
-            // an iteration are not: given one photon, fewer others lie nearby. They are from iteration to iteration.
-            sampler.path(k, &mut Sampler::new(context.seed ^ LIGHT_STREAM, k, index), store, rays);
+            sampler.path(k as u32, &mut light_random(context, k as u32, index), store, rays);
         };
         let light = &mut self.light;
         light.clear();
@@ -315,7 +342,7 @@ impl Band {
     }
 
     /// Gives back what the last one was weighed and solved with.
-    fn forget(&mut self) {
+    pub fn forget(&mut self) {
         (self.clusters, self.weights, self.reflected) = Default::default();
     }
 

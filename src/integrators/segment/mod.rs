@@ -7,14 +7,15 @@ use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::Rect;
 use crate::transport::camera::Primary;
 use crate::transport::{Cut, Techniques};
-use band::Band;
+use band::{Band, Lengths};
 use learning::Learnt;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// What an arrival and the segment that leaves it take until they are in the film, about, bytes.
-const BYTES_PER_ARRIVAL: f32 = 100.0;
-/// Arrivals for which there is room at least: for each pixel of a band, with those of a light path, and for each light path.
-const LEAST_ARRIVALS: [f32; 2] = [20.0, 5.0];
+/// What is held of an iteration until it is in the film, about, bytes: of a pixel, of a camera arrival on a diffuse surface
+/// with the segments that leave it, of one on another, whose lobes are kept pair by pair, and of a light arrival.
+const BYTES: [f32; 4] = [180.0, 100.0, 300.0, 110.0];
+/// Most of the memory budget for light paths, which are there with every band.
+const LIGHT_SHARE: f32 = 0.5;
 
 /// Segment-based light transport. Its stores are kept from one iteration to the next.
 #[derive(Debug, Default)]
@@ -22,8 +23,8 @@ pub struct Segment {
     techniques: Techniques,
     band: Band,
     learnt: Learnt,
-    /// Mean arrivals of a camera path, once they have been counted: closed white rooms have very long ones.
-    arrivals: Option<f32>,
+    /// Arrivals of paths, once they have been counted: closed white rooms have very many.
+    lengths: Option<Lengths>,
 }
 
 impl Segment {
@@ -56,10 +57,10 @@ impl Segment {
     /// stopped.
     fn all_bands(&mut self, context: &Context, index: u32, cut: &Cut, costs: &mut StageCosts) -> bool {
         let rays_before = context.counters.rays.load(Relaxed);
-        let counted = || self.band.mean_arrivals(context, &self.learnt);
-        let arrivals = *self.arrivals.get_or_insert_with(counted);
-        let bands = self.bands(context, arrivals);
-        let all = self.most_light_paths(context, arrivals);
+        let counted = || self.band.lengths(context, &self.learnt);
+        let lengths = *self.lengths.get_or_insert_with(counted);
+        let all = self.most_light_paths(context, lengths);
+        let bands = self.bands(context, lengths, all);
         let Self { techniques, band, learnt, .. } = self;
         let light_paths = learnt.light_paths(context, techniques, all, index);
         if !band.sample_light(context, learnt, index, light_paths as u32, cut) {
@@ -79,30 +80,29 @@ impl Segment {
             costs.stage("gather", band.primaries.capacity() * size_of::<Primary>());
             learnt.take_in(&of_band, (k, place, band), before, &mut lessons, cut, costs);
         }
+        band.forget();
         let rays = context.counters.rays.load(Relaxed) - rays_before;
         learnt.end(context, &lessons, rays, cut, costs);
         true
     }
 
-    /// How many there may be of what has so many arrivals each.
-    fn affordable(&self, arrivals: f32) -> f32 {
-        self.techniques.memory_budget as f32 / (arrivals * BYTES_PER_ARRIVAL)
-    }
-
     /// The parts of the film that are made one after the other: each is clustered for itself, with all light paths. What
-    /// bridges bring to the lens may arrive anywhere, so theirs is one. `arrivals`: of a camera path, on average.
-    fn bands(&self, context: &Context, arrivals: f32) -> Vec<Rect> {
+    /// bridges bring to the lens may arrive anywhere, so theirs is one.
+    fn bands(&self, context: &Context, lengths: Lengths, light_paths: f32) -> Vec<Rect> {
         if self.techniques.bridges.is_some() {
             return vec![context.film.rect()];
         }
-        // light paths are as long
-        let of_pixel = (2.0 * arrivals).max(LEAST_ARRIVALS[0]);
-        context.film.bands(self.affordable(of_pixel) as u64)
+        let [pixel, diffuse, other, light] = BYTES;
+        let left = self.techniques.memory_budget as f32 - light_paths * lengths.light * light;
+        let of_pixel = pixel + lengths.diffuse * diffuse + lengths.other * other;
+        context.film.bands((left / of_pixel) as u64)
     }
 
-    /// Light paths of an iteration, if all are sampled; they are those of all bands. `arrivals`: of a path, on average.
-    fn most_light_paths(&self, context: &Context, arrivals: f32) -> f32 {
+    /// Light paths of an iteration, if all are sampled; they are those of all bands.
+    fn most_light_paths(&self, context: &Context, lengths: Lengths) -> f32 {
         let wanted = (self.techniques.light_paths * context.film.rect().area() as f32).ceil();
-        wanted.min(self.affordable(arrivals.max(LEAST_ARRIVALS[1])).floor().max(1.0))
+        let [.., light] = BYTES;
+        let most = LIGHT_SHARE * self.techniques.memory_budget as f32 / (lengths.light * light);
+        wanted.min(most.floor().max(1.0))
     }
 }

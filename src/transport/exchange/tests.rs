@@ -95,9 +95,9 @@ fn the_weights_of_all_techniques_sum_to_one() {
                 continue;
             }
             let twin = if returns { light.arrivals.get(i + 1).survival } else { 0.0 };
-            let own = (light.arrivals.get(i).survival + twin) * light.photons.get(i).pdf;
+            let own = (light.arrivals.get(i).survival + twin) * light.photons.get(i).pdf / end.area;
             let segment = Densities::of(s, &weights, i);
-            let p_light = weights.densities[clusters.place(i + 1) as usize].light;
+            let p_light = weights.densities[i + 1].light;
             // the light path itself is left out both ways, all of it
             let camera_weight = segment.camera / (segment.camera + segment.light * (p_light - own).max(0.0));
             let light_weight = photon_value(s, &weights, i + 1).x / start.inverse_area;
@@ -138,11 +138,11 @@ fn sums_over_ten_million_segments_are_as_good_as_in_double_precision() {
     let arriving = |(i, v): (usize, &Vec3)| v.as_dvec3() * f64::from(camera.outgoing.pdf(i));
     let exact: DVec3 = values.iter().enumerate().map(arriving).sum();
     let expected = camera.arrivals.get(0).reflectance.as_dvec3() * exact / f64::from(cluster.area);
-    let got = reflect(s, &weights, |i| values[i], |_, light| light, &ON)[0].as_dvec3();
+    let got = reflect(s, &weights, |i| offer(s, i, values[i]), |_, light| light, &ON)[0].as_dvec3();
     assert!((got / expected - 1.0).abs().max_element() < 1e-5, "{got}, not {expected}");
 
     let choices: f64 = camera.arrivals.iter().map(|a| f64::from(a.survival)).sum();
-    let expected = choices * f64::from(camera.outgoing.pdf(0));
-    let got = f64::from(weights.densities[clusters.place(0) as usize].camera);
+    let expected = choices * f64::from(camera.outgoing.pdf(0)) / f64::from(cluster.area);
+    let got = f64::from(weights.densities[0].camera);
     assert!((got / expected - 1.0).abs() < 1e-5, "{got}, not {expected}");
 }

@@ -5,7 +5,7 @@ use crate::shading::SurfaceClass;
 use crate::shading::bsdf::Among;
 use crate::transport::Estimator;
 use crate::transport::cluster::Areas;
-use crate::transport::exchange::reflect;
+use crate::transport::exchange::{offer, reflect};
 use crate::transport::testing::{ON, clustered, room, sampled};
 use crate::transport::weigh::Weights;
 
@@ -38,7 +38,7 @@ fn an_arrival_gathers_from_its_own_segment_and_from_other_paths() {
             false => Vec3::ZERO,
         };
         let values: Vec<Vec3> = (0..path.len()).map(value).collect();
-        let got = reflect(s, &weights, |i| values[i], |_, light| light, &ON);
+        let got = reflect(s, &weights, |i| offer(s, i, values[i]), |_, light| light, &ON);
         // value and `q p` of an arrival's lobes
         let look = |i: usize, w: Vec3| {
             let a = camera.arrivals.get(i);

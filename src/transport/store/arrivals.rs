@@ -190,6 +190,12 @@ impl Arrivals {
         self.0[i].survival()
     }
 
+    /// See [`Arrival::class`].
+    #[inline]
+    pub fn class(&self, i: usize) -> SurfaceClass {
+        self.0[i].class()
+    }
+
     /// See [`Arrival::goes_on`].
     #[inline]
     pub fn goes_on(&self, i: usize) -> bool {
