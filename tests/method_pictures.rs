@@ -130,7 +130,7 @@ fn cluster_maps() {
         let color = |p: &Primary| match p.arrival {
             None => Vec3::ONE,
             Some(a) => {
-                let id = clusters.of[a as usize];
+                let id = clusters.of(a as usize) as u32;
                 let tint = Vec3::new(hash_unit(id, 1), hash_unit(id, 2), hash_unit(id, 3));
                 (Vec3::splat(0.35) + 0.65 * tint) * shade(store.arrivals.get(a as usize).normal)
             }

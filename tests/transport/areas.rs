@@ -33,10 +33,10 @@ fn photons(world: &World, seed: u32, sides: &[Vec3], count: u32) -> Arrivals {
 fn both_areas(world: &World, grid: &Grid, all: Numbered) -> [Vec<f32>; 2] {
     let mut clusters = Clusters::default();
     assert!(clusters.group(world, grid, all, &ON) && clusters.measure(world, grid, all, Areas::True, &ON));
-    let by_rays = clusters.of.iter().map(|&c| 1.0 / clusters.clusters[c as usize].inverse_area);
-    let first = |c: u32| all.get(clusters.order[clusters.clusters[c as usize].first as usize]);
-    let by_plane = clusters.of.iter().map(|&c| {
-        let representative = first(c);
+    let each = (0..clusters.arrivals()).map(|i| &clusters.clusters[clusters.of(i)]);
+    let by_rays = each.clone().map(|c| 1.0 / c.inverse_area);
+    let by_plane = each.map(|c| {
+        let representative = all.get(clusters.order[c.first as usize]);
         let voxel = grid.voxel(representative.position);
         Cell { grid, voxel, representative: &representative, parted: None }.plane_cut(representative.position)
     });
@@ -216,7 +216,7 @@ fn photons_on_spheres_are_as_dense_as_they_are() {
             assert!(clusters.group(&world, &grid, all, &ON));
             areas.map(|areas| {
                 let found = |i: usize| {
-                    let c = &clusters.clusters[clusters.of[i] as usize];
+                    let c = &clusters.clusters[clusters.of(i)];
                     f64::from(c.lights) / f64::from(areas[i])
                 };
                 (0..camera.len()).map(found).sum::<f64>() / f64::from(queries) / exact

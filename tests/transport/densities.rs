@@ -111,17 +111,16 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
     let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
     assert!(weights.weigh(s, Estimator::LeaveOneOut, &ON));
     let n = camera.arrivals.len();
-    let at = |i: usize| (weights.densities[clusters.place[i] as usize], f64::from(s.cluster_of(i).area));
-    let from_camera = (0..n).filter(|&i| camera.outgoing.get(i).forward > 0.0).map(|i| {
-        let ((x, area_x), (y, area_y)) = (at(i), at(i + 1));
-        1.0 / (f64::from(x.camera) / area_x + f64::from(y.light) / area_y)
-    });
+    let density = |camera: usize, light: usize| {
+        f64::from(weights.densities[camera].camera) + f64::from(weights.densities[light].light)
+    };
+    let has_end = |&i: &usize| camera.outgoing.get(i).forward > 0.0;
+    let from_camera = (0..n).filter(has_end).map(|i| 1.0 / density(i, i + 1));
     let later = |j: &usize| matches!(light.photons.get(*j).rivals, Rivals::Later { .. });
     let from_light = (0..light.photons.len()).filter(later).map(|j| {
-        let ((x, area_x), (y, area_y)) = (at(n + j), at(n + j - 1));
         // what the engine leaves out of a light arrival's density is its own part
         let own = light.arrivals.get(j - 1).survival * light.photons.get(j - 1).pdf;
-        1.0 / (f64::from(x.camera) / area_x + f64::from(y.light + own) / area_y)
+        1.0 / (density(n + j, n + j - 1) + f64::from(own / s.cluster_of(n + j - 1).area))
     });
     from_camera.sum::<f64>() + from_light.sum::<f64>()
 }
@@ -191,7 +190,7 @@ fn densities_integrate_to_the_number_of_paths_that_go_on() {
             for c in clusters.clusters.iter().filter(|c| c.lights > 0) {
                 let read = |j: usize| {
                     let i = camera.arrivals.len() + j;
-                    f64::from(weights.densities[clusters.place[i] as usize].camera * cosines[j])
+                    f64::from(weights.densities[i].camera * c.area * cosines[j])
                 };
                 integral += 2.0 * PI * s.lights(c).map(read).sum::<f64>() / f64::from(c.lights);
                 expected += s.cameras(c).map(|i| f64::from(camera.arrivals.get(i).survival)).sum::<f64>();
