@@ -127,7 +127,7 @@ pub(super) fn along_path(s: Sampled, w: &Weights, i: usize) -> Vec3 {
         // paired values have it within
         SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
             let cluster = s.clusters.of(i);
-            let row = (s.clusters.place(i) - s.clusters.clusters[cluster].first) as usize;
+            let row = s.row(i, &s.clusters.clusters[cluster]);
             (w.row(cluster, row)[row].decode(), w.apart(i))
         }
     };
@@ -207,8 +207,7 @@ pub(super) fn reflect<T: Default + Send>(
     let shared =
         per_diffuse_cluster(s, cut, |c| s.cameras(c).map(arriving).sum::<DVec3>().as_vec3() / c.area);
     let of_others = |i: usize, c: &Cluster, apart: f32| {
-        let row = (s.clusters.place(i) - c.first) as usize;
-        let gathered = Gathered::new(s, c, row);
+        let gathered = Gathered::new(s, c, s.row(i, c));
         gathered.arrivals(s, c).map(arriving).sum::<DVec3>().as_vec3() * (apart / c.area)
     };
     per_arrival(s, cut, |i, k, c| {
@@ -219,7 +218,7 @@ pub(super) fn reflect<T: Default + Send>(
                 s.camera.arrivals.reflectance(i) * arriving
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let f = w.row(k, (s.clusters.place(i) - c.first) as usize);
+                let f = w.row(k, s.row(i, c));
                 let sum: Vec3 = f.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * offer(i)).sum();
                 sum / c.area
             }

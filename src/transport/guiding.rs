@@ -110,13 +110,12 @@ fn worth_of_paths(o: Outcome, cut: &Cut) -> Vec<f32> {
         if cut.is_raised() || o.max_depth.is_some_and(|most| s.light.photons.bounces(j) >= most) {
             return 0.0;
         }
-        let place = s.clusters.place(cameras + j);
         let k = s.clusters.of(cameras + j);
         let c = &s.clusters.clusters[k];
         let reflected = match c.class {
             SurfaceClass::Diffuse => shared[k] * s.light.arrivals.back_pdf(j),
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let column = (place - c.first) as usize;
+                let column = s.row(cameras + j, c);
                 s.cameras(c)
                     .enumerate()
                     .map(|(row, i)| w.row(k, row)[column].decode() * arrivals[i].decode())

@@ -146,13 +146,12 @@ impl Recursion<'_> {
             if cut.is_raised() || (i >= n && s.light.photons.pdf(i - n) <= 0.0) {
                 return Vec3::ZERO;
             }
-            let (k, place) = (s.clusters.of(i), s.clusters.place(i));
+            let k = s.clusters.of(i);
             let c = &s.clusters.clusters[k];
             let gathered = match c.class {
                 SurfaceClass::Diffuse => self.reflectance(i) * shared[k],
                 SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                    let (to_camera, to_light) =
-                        w.row(k, (place - c.first) as usize).split_at(c.cameras as usize);
+                    let (to_camera, to_light) = w.row(k, s.row(i, c)).split_at(c.cameras as usize);
                     let cameras: Vec3 =
                         to_camera.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * values[i]).sum();
                     // the row holds f (n_o / n_i)^2, and radiance is basic

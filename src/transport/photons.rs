@@ -140,7 +140,6 @@ pub(super) fn gather_photons(
         if c.lights == 0 && s.bridges.is_none() {
             return SharedExponent::default();
         }
-        let place = s.clusters.place(i);
         let p_light = w.densities[i].light;
         let approach = Approach::new(s, w, i, c);
         // factor on light of a photon whose path's part of `P_light` is `own`
@@ -161,7 +160,7 @@ pub(super) fn gather_photons(
                 }
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let row = (place - c.first) as usize;
+                let row = s.row(i, c);
                 let f = &w.row(k, row)[c.cameras as usize..];
                 for ((f, own), j) in f.iter().zip(w.own(k, row)).zip(s.lights(c)) {
                     sum += carry(*own, others(j)) * f.decode() * light(j);

@@ -92,6 +92,12 @@ impl<'a> Sampled<'a> {
         &self.clusters.clusters[self.clusters.of(i)]
     }
 
+    /// Where arrival number `i` is among those of its cluster `c`.
+    #[inline]
+    pub(super) fn row(&self, i: usize, c: &Cluster) -> usize {
+        (self.clusters.place(i) - c.first) as usize
+    }
+
     /// Indices of the cluster's camera arrivals.
     pub fn cameras(&self, c: &Cluster) -> impl ExactSizeIterator<Item = usize> + Clone + use<'a> {
         let order = &self.clusters.order;

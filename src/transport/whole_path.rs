@@ -271,7 +271,7 @@ impl WholePaths<'_> {
                 s.lights(c).for_each(|j| photon(j, reflectance * s.light.arrivals.back_pdf(j)));
             }
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let row = (s.clusters.place(i) - c.first) as usize;
+                let row = s.row(i, c);
                 let values = &w.row(s.clusters.of(i), row)[c.cameras as usize..];
                 s.lights(c).zip(values).for_each(|(j, value)| photon(j, value.decode()));
             }
@@ -309,7 +309,7 @@ impl WholePaths<'_> {
         match c.class {
             SurfaceClass::Diffuse => s.camera.arrivals.reflectance(i) * s.camera.outgoing.get(i).pdf,
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                let row = (s.clusters.place(i) - c.first) as usize;
+                let row = s.row(i, c);
                 self.w.row(cluster, row)[row].decode()
             }
         }

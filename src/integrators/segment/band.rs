@@ -306,7 +306,6 @@ impl Band {
         paths: u32,
         cut: &Cut,
     ) -> bool {
-        self.forget();
         let sampler = self.light_sampler(context, learnt, paths as f32);
         let path = |k: usize, store: &mut LightStore, rays: &mut u64| {
             sampler.path(k as u32, &mut light_random(context, k as u32, index), store, rays);
@@ -341,7 +340,7 @@ impl Band {
         is_done
     }
 
-    /// Gives back what the last one was weighed and solved with.
+    /// Gives back what it was clustered, weighed and solved with.
     pub fn forget(&mut self) {
         (self.clusters, self.weights, self.reflected) = Default::default();
     }
