@@ -1,8 +1,8 @@
-"""docs/performance.md, scenes made by others: `segment` and `path` beside Mitsuba's compiled path tracer.
+"""docs/performance.md, scenes made by others: `segment` and `path` beside Cycles and Mitsuba.
 
-Needs the scenes and the harness that are shared between renderers (SEGUE_SHARED, or ../shared beside the checkout) and a
-Python environment PEERS_PYTHON with `mitsuba` and `usd-core`. Without them it says so and does nothing. Run:
-.venv/bin/python benches/interiors.py [SCENE ...]
+Needs the scenes and the harness that are shared between renderers (SEGUE_SHARED, or ../shared beside the checkout) and two
+Python environments: PEERS_BPY_PYTHON with `bpy`, PEERS_PYTHON with `mitsuba` and `usd-core`. Without them it says so and does
+nothing. Run: .venv/bin/python benches/interiors.py [SCENE ...]
 """
 
 from __future__ import annotations
@@ -35,27 +35,29 @@ WIDTH = 256
 HEADING = "Scenes made by others"
 HEAD = f"""relMSE after {SECONDS:g} seconds of {THREADS} threads (processor seconds over threads; loading, building and compiling left out), {WIDTH}
 pixels wide, by `benches/interiors.py`. `segment` and `path`: against two references by `segment` with a fixed kernel of a third of a pixel and other seeds,
-{2 * SECONDS:g} s each, so that blur and whatever else is wrong with the pictures counts. Mitsuba (`llvm_ad_rgb`, `path`, the scenes' original materials, which
-differ a little): noise alone, from two renders of other seeds, by the same references' brightness.
+{2 * SECONDS:g} s each, so that blur and whatever else is wrong with the pictures counts. The others: noise alone, from two renders of other seeds, by the same
+references' brightness. Cycles renders what Blender imports, with glass as glass, without and with path guiding; Mitsuba (`llvm_ad_rgb`, `path`) the stage's materials.
+In brackets the mean of the picture over that of the references: what is far from 1 is not the same scene.
 
-| scene | `segment` | `path` | Mitsuba | Mitsuba over `segment` |
-| --- | ---: | ---: | ---: | ---: |
+| scene | `segment` | `path` | Cycles | Cycles, guided | Mitsuba | best of the others over `segment` |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: |
 """
+#: How the others are run: environment, script and what it wants to know beside stage, width, time and file.
+OTHERS = (
+    ("PEERS_BPY_PYTHON", "cycles_stage.py", ["base"]),
+    ("PEERS_BPY_PYTHON", "cycles_stage.py", ["guided"]),
+    ("PEERS_PYTHON", "mitsuba_stage.py", []),
+)
 
 
-def theirs(stage: Path) -> tuple[np.ndarray, float]:
-    """Two pictures by Mitsuba, and the share of the time that counts which each of them took."""
+def theirs(
+    stage: Path, python: str, script: str, more: list[str]
+) -> tuple[np.ndarray, float]:
+    """Two pictures by another renderer, and the share of the time that counts which each of them took."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "pictures.npy"
-        command = [
-            os.environ["PEERS_PYTHON"],
-            str(ROOT / "benches" / "mitsuba_stage.py"),
-            str(stage),
-            str(WIDTH),
-            str(SECONDS),
-            str(THREADS),
-            str(out),
-        ]
+        command = [os.environ[python], str(ROOT / "benches" / script), str(stage)]
+        command += [str(WIDTH), str(SECONDS), str(THREADS), *more, str(out)]
         done = subprocess.run(
             command,
             check=True,
@@ -71,9 +73,10 @@ def theirs(stage: Path) -> tuple[np.ndarray, float]:
 def row(name: str) -> str:
     """The table's row of a scene."""
     stage = SHARED / "scenes" / name / f"{name}.usdc"
-    pair, their_time = theirs(stage)
+    found = [theirs(stage, *other) for other in OTHERS]
+    height, width = found[0][0].shape[1:3]
     scene = usd.load(stage).scene
-    common = {"resolution": [pair.shape[2], pair.shape[1]], "threads": THREADS}
+    common = {"resolution": [width, height], "threads": THREADS}
 
     def picture(**settings: object) -> tuple[np.ndarray, float]:
         job = Render(scene, {**common, **settings})
@@ -85,19 +88,28 @@ def row(name: str) -> str:
         picture(time=2 * SECONDS, **{**SHARP, "seed": SHARP["seed"] + k})[0]
         for k in range(2)
     )
-    noise = relative_noise(*pair, (first + second) / 2) * their_time
-    errors = []
+    truth = (first + second) / 2
+    errors, means = [], []
     for method in ("segment", "path"):
         ours, time = picture(integrator=method, time=SECONDS)
         errors.append(relative_error(ours, first, second) * time)
-    cells = [f"{e:.2g}" for e in (*errors, noise, noise / errors[0])]
-    return f"| {name} | " + " | ".join(cells) + " |"
+        means.append(ours.mean())
+    noises = [relative_noise(*pair, truth) * time for pair, time in found]
+    means += [pair.mean() for pair, _ in found]
+    cells = [
+        f"{error:.2g} ({mean / truth.mean():.2f})"
+        for error, mean in zip(errors + noises, means, strict=True)
+    ]
+    return (
+        f"| {name} | " + " | ".join([*cells, f"{min(noises) / errors[0]:.2g}"]) + " |"
+    )
 
 
 def main(names: list[str]) -> int:
     """Writes the table."""
-    if "PEERS_PYTHON" not in os.environ or not (SHARED / "scenes").exists():
-        print(f"skipped: PEERS_PYTHON or {SHARED} is not there")
+    missing = [v for v in ("PEERS_BPY_PYTHON", "PEERS_PYTHON") if v not in os.environ]
+    if missing or not (SHARED / "scenes").exists():
+        print(f"skipped: {', '.join(missing) or SHARED} is not there")
         return 0
     rows = []
     for name in names or SCENES:
