@@ -4,7 +4,7 @@ use super::grid::{Grid, Voxel};
 use super::store::Arrival;
 use crate::math::sampler::{hash, hash_unit};
 use crate::shading::{SurfaceClass, World};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use std::ops::RangeInclusive;
 
 /// Coverage points that have to lie on the cluster, where photons are divided by its area: as many as there are photons,
@@ -22,6 +22,9 @@ const ENOUGH: u32 = *POINTS_OF_PHOTONS.start();
 const FEW_TRIES: u32 = 32;
 /// Distance from the representative's plane, in edges of the voxel, within which a surface is taken to be in sight.
 const NEAR_PLANE: f32 = 0.05;
+/// Cosine of the angle between a shading normal and the surface's own below which faces with the same shading normal may
+/// lie along any axis.
+const STEEP: f32 = 0.8;
 /// Most surfaces that are looked at below one coverage point.
 const LAYERS: u32 = 64;
 
@@ -33,16 +36,21 @@ pub struct Cell<'a> {
     pub voxel: Voxel,
     /// One of its arrivals.
     pub representative: &'a Arrival,
-    /// Where something divides the voxel: whether this is the part that the representative does not see.
-    pub parted: Option<bool>,
+    /// Whether something divides the voxel, and the cluster has but a part of it.
+    pub is_divided: bool,
 }
 
 impl Cell<'_> {
-    /// The paper's estimate: the area that the voxel cuts out of the plane through `point`.
-    pub fn plane_cut(&self, point: Vec3) -> f32 {
+    /// The paper's estimate: the area that the voxel cuts out of a plane.
+    fn plane_cut(&self, point: Vec3, normal: Vec3) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
-        let (p, n) = ((point - low) / edge, self.representative.normal);
-        edge * edge * unit_plane_cut(p, n)
+        edge * edge * unit_plane_cut((point - low) / edge, normal)
+    }
+
+    /// Normal of the representative's surface itself, on the side of its shading normal.
+    fn plane(&self, world: &World) -> Vec3 {
+        let normal = self.representative.surface(world).place.normal;
+        if normal.dot(self.representative.normal) < 0.0 { -normal } else { normal }
     }
 
     /// The exact area where the whole cut lies on one triangle and so do all members: `triangles`, by instance and number.
@@ -52,7 +60,7 @@ impl Cell<'_> {
         mut triangles: impl Iterator<Item = (u32, u32)>,
     ) -> Option<f32> {
         let r = self.representative;
-        if self.parted.is_some() || !triangles.all(|t| t == (r.at.instance, r.at.triangle)) {
+        if self.is_divided || !triangles.all(|t| t == (r.at.instance, r.at.triangle)) {
             return None;
         }
         let (low, edge) = self.grid.place(&self.voxel);
@@ -70,39 +78,45 @@ impl Cell<'_> {
         plane_cut_corners(point, n).into_iter().all(belongs).then(|| edge * edge * unit_plane_cut(point, n))
     }
 
-    /// Estimate by rays through the voxel, along the axis nearest to the normal, which meet what of the surface belongs
-    /// to the cluster. Photons are divided by the area, so it is the reciprocal that has to be right on average:
+    /// Estimate by rays through the voxel, along the axis nearest to the surface's normal, which meet what of the surface
+    /// belongs to the cluster; along all axes where shading normals lean away from that. Photons are divided by the area, so it is the reciprocal that has to be right on average:
     /// independent points are tried until `wanted` of them lie on the cluster (inverse binomial sampling, Haldane
     /// 1945). Where that takes too many, the next one is taken to be on it: of `M` hits in `N` tries, the `k`-th is
     /// number `k (N + 1) / (M + 1)` in the mean, so the reciprocal's mean stays as it would have been.
-    /// Estimates of different `wanted` are independent. `hidden`: whether a point with its normal is out of
-    /// the representative's sight. Adds the points that were tried to `probes`.
+    /// Estimates of different `wanted` are independent. `belongs`: whether a point with its normal is
+    /// in the cluster's part of the voxel. Adds the points that were tried to `probes`.
     pub fn coverage(
         &self,
         world: &World,
         wanted: u32,
-        hidden: &impl Fn(Vec3, Vec3) -> bool,
+        belongs: &impl Fn(Vec3, Vec3) -> bool,
         probes: &mut u64,
     ) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
-        let n = self.representative.normal;
-        let axis = n.abs().max_position();
-        let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
-        let bin = self.grid.bin(n);
+        let ns = self.representative.normal;
+        let plane = self.plane(world);
+        // seen along one axis, a surface that is smooth by its normals alone may be seen edge-on
+        let shares = match ns.dot(plane) < STEEP {
+            true => Vec3::splat(1.0 / 3.0),
+            false => Vec3::AXES[plane.abs().max_position()],
+        };
+        let bin = self.grid.bin(ns);
         let at = self.representative.position;
         let seed = hash(wanted, hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits())));
         let (mut sum, mut squares, mut tries, mut found) = (0.0, 0.0, 0, 0);
         let mut goal = wanted;
         let mut most = if wanted == FEW_POINTS { FEW_TRIES } else { TRIES[0] };
         while found < goal && tries < most {
-            let u = Vec2::new(hash_unit(seed, 2 * tries), hash_unit(seed, 2 * tries + 1));
+            let [u, v, choice] = std::array::from_fn(|k| hash_unit(seed, 3 * tries + k as u32));
             tries += 1;
+            let axis = (0..2).find(|&k| choice < shares.to_array()[..=k].iter().sum()).unwrap_or(2);
+            let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
             let mut top = low;
-            top[u_axis] += u.x * edge;
-            top[v_axis] += u.y * edge;
+            top[u_axis] += u * edge;
+            top[v_axis] += v * edge;
             let mut bottom = top;
             top[axis] += edge;
-            if n[axis] < 0.0 {
+            if ns[axis] < 0.0 {
                 std::mem::swap(&mut top, &mut bottom);
             }
             let (mut is_first, mut is_there) = (true, false);
@@ -110,26 +124,26 @@ impl Cell<'_> {
             let mut upper: Option<(f32, bool)> = None;
             world.for_each_surface(top, bottom, LAYERS, |p| {
                 // where nothing divides the cluster, only what bends away or lies below something may be out of sight
-                let rise = (p.place.position - at).dot(n);
-                let is_doubtful = self.parted.is_some() || !is_first || rise.abs() > NEAR_PLANE * edge;
+                let rise = (p.place.position - at).dot(plane);
+                let is_doubtful = self.is_divided || !is_first || rise.abs() > NEAR_PLANE * edge;
                 is_first = false;
                 let class = world.class(p.material);
-                let faces = p.ns.dot(n) > 0.0;
-                let ns = match class == SurfaceClass::Transmitting || faces {
+                let faces = p.ns.dot(ns) > 0.0;
+                let side = match class == SurfaceClass::Transmitting || faces {
                     true => p.ns,
                     false => -p.ns,
                 };
                 let there = class == self.representative.class
-                    && self.grid.bin(ns) == bin
+                    && self.grid.bin(side) == bin
                     && self.grid.voxel(p.place.position) == self.voxel
-                    && (!is_doubtful || hidden(p.place.position, ns) == self.parted.unwrap_or(false));
+                    && (!is_doubtful || belongs(p.place.position, side));
                 let depth = (p.place.position[axis] - top[axis]).abs();
                 let is_lower = upper.is_some_and(|(d, f)| f != faces && depth - d < NEAR_PLANE * edge);
                 upper = (there && !is_lower).then_some((depth, faces));
                 if there && !is_lower {
                     is_there = true;
                     // a surface seen edge-on would count without bound
-                    let slope = 1.0 / p.place.normal[axis].abs().max(0.05);
+                    let slope = 1.0 / p.place.normal.abs().dot(shares).max(0.05);
                     sum += slope;
                     squares += slope * slope;
                 }
@@ -143,7 +157,7 @@ impl Cell<'_> {
         let cut_short = if found < goal { 1.0 } else { 0.0 };
         let area_of_try = edge * edge / (tries as f32 + cut_short);
         if found == 0 {
-            return self.plane_cut(at).min(area_of_try);
+            return self.plane_cut(at, plane).min(area_of_try);
         }
         // the reciprocal of a mean of slopes is too large by their variance over their number, to first order
         let spread =

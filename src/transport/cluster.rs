@@ -2,6 +2,7 @@
 
 use super::Cut;
 use super::area::{Cell, FEW_POINTS, MOST_POINTS, POINTS_OF_PHOTONS};
+use super::division::{Division, MOST_PARTS, divide};
 use super::grid::Grid;
 use super::store::{Arrival, Arrivals};
 use super::unseen::{self, UNSEEN};
@@ -15,9 +16,6 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 /// Most camera arrivals, and half of the most light arrivals, in a cluster whose lobes are evaluated pair by
 /// pair; larger ones are divided at random.
 const MOST_PAIRED: u32 = 16;
-/// By how much points are lifted off their surface before it is asked whether something stands between
-/// them, in edges of the voxel.
-const LIFT: f32 = 0.05;
 /// Fewest voxels or clusters that one task takes.
 const GRAIN: usize = 64;
 
@@ -43,12 +41,12 @@ pub struct Cluster {
 /// The piece of a surface that a cluster is; of use until its areas are known.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
-    /// Arrival in whose voxel it is.
-    representative: u32,
-    /// Where something divides the voxel: whether this is the part that the representative does not see.
-    parted: Option<bool>,
-    /// Clusters that share its part of the voxel at random, itself included.
-    parts: u32,
+    /// First arrival of each part of its voxel.
+    firsts: [u32; MOST_PARTS],
+    /// How many there are, and which of them it is in.
+    divided: (u8, u8),
+    /// Clusters that share that part at random, itself included.
+    sharing: u32,
 }
 
 impl Cluster {
@@ -261,25 +259,6 @@ impl Clusters {
     }
 }
 
-/// The point from which it is asked whether a voxel is divided: above the first of its arrivals.
-struct Hub {
-    point: Vec3,
-    lift: f32,
-}
-
-impl Hub {
-    /// Above a position, on the side of this normal.
-    fn new(grid: &Grid, (position, normal): (Vec3, Vec3)) -> Self {
-        let (_, edge) = grid.place(&grid.voxel(position));
-        let lift = LIFT * edge;
-        Self { point: position + normal * lift, lift }
-    }
-
-    fn is_hidden(&self, world: &World, p: Vec3, normal: Vec3) -> bool {
-        !world.is_clear(p + normal * self.lift, self.point)
-    }
-}
-
 /// Some clusters as they are laid out one after the other.
 #[derive(Default)]
 struct Layout {
@@ -301,16 +280,12 @@ impl Layout {
         layout.clusters.reserve_exact(groups.len());
         layout.pieces.reserve_exact(groups.len());
         let mut rest = &places[..];
-        let mut hidden = Vec::new();
+        let mut parts = Vec::new();
         for group in groups {
             let (here, others) = rest.split_at(group.len());
             rest = others;
-            let hub = Hub::new(grid, here[0]);
-            // the representative sees itself
-            hidden.clear();
-            hidden.push(false);
-            hidden.extend(here[1..].iter().map(|&(p, n)| !cut.is_raised() && hub.is_hidden(world, p, n)));
-            layout.add(group, &hidden, all.get(group[0].1).class);
+            let count = divide(world, grid, here, &mut parts, cut);
+            layout.add(group, (&parts, count), all.get(group[0].1).class);
         }
         layout
     }
@@ -321,25 +296,26 @@ impl Layout {
             + self.pieces.capacity() * size_of::<Piece>()
     }
 
-    /// The clusters of what shares a key: one, or two where something stands between its points; each divided at
-    /// random where its lobes are evaluated pair by pair. Each such part has its share of the area, as if
-    /// the surface had been cut into interleaved pieces.
-    fn add(&mut self, group: &[(u64, u32)], hidden: &[bool], class: SurfaceClass) {
-        let representative = group[0].1;
-        let parted = hidden.contains(&true);
-        for far in [false, true] {
-            let members = || group.iter().zip(hidden).filter(|&(_, &h)| h == far).map(|(&(_, i), _)| i);
-            let total = members().count() as u32;
-            let from_camera = members().take_while(|&i| i < self.cameras).count() as u32;
-            let parts = match class {
+    /// The clusters of what shares a key: one for each part, or several that share it at random where lobes are
+    /// evaluated pair by pair. Of its area these have equal shares, as if the surface had been cut into interleaved
+    /// pieces.
+    fn add(&mut self, group: &[(u64, u32)], (parts, count): (&[u8], usize), class: SurfaceClass) {
+        let members =
+            |part| group.iter().zip(parts).filter(move |p| usize::from(*p.1) == part).map(|(&(_, i), _)| i);
+        let mut firsts = [u32::MAX; MOST_PARTS];
+        (0..count).for_each(|part| firsts[part] = members(part).next().unwrap_or(u32::MAX));
+        for part in 0..count {
+            let total = members(part).count() as u32;
+            let from_camera = members(part).take_while(|&i| i < self.cameras).count() as u32;
+            let sharing = match class {
                 SurfaceClass::Diffuse => 1,
                 SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
                     from_camera.max((total - from_camera) / 2).div_ceil(MOST_PAIRED).max(1)
                 }
             };
-            for part in 0..parts {
+            for share in 0..sharing {
                 let first = self.order.len();
-                self.order.extend(members().filter(|&i| hash(representative, i) % parts == part));
+                self.order.extend(members(part).filter(|&i| hash(firsts[part], i) % sharing == share));
                 let taken = &self.order[first..];
                 if taken.is_empty() {
                     continue;
@@ -353,13 +329,13 @@ impl Layout {
                     inverse_area: 0.0,
                     class,
                 });
-                self.pieces.push(Piece { representative, parted: parted.then_some(far), parts });
+                self.pieces.push(Piece { firsts, divided: (count as u8, part as u8), sharing });
             }
         }
     }
 }
 
-/// The areas of a cluster, each part of a voxel's having its share. Returns how many points were looked at.
+/// The areas of a cluster, its share of those of a part. Returns how many points were looked at.
 fn measure(
     world: &World,
     grid: &Grid,
@@ -368,21 +344,22 @@ fn measure(
     (c, piece): (&mut Cluster, &Piece),
     areas: Areas,
 ) -> u64 {
-    let representative = all.get(piece.representative);
+    let (count, part) = (usize::from(piece.divided.0), usize::from(piece.divided.1));
+    let representative = all.get(piece.firsts[part]);
     let voxel = grid.voxel(representative.position);
-    let parts = piece.parts as f32;
+    let sharing = piece.sharing as f32;
     let (_, edge) = grid.place(&voxel);
-    c.area = edge * edge / parts;
+    c.area = edge * edge / sharing;
     if areas == Areas::None {
         return 0;
     }
-    let cell = Cell { grid, voxel, representative: &representative, parted: piece.parted };
-    let hub = Hub::new(grid, (representative.position, representative.normal));
+    let cell = Cell { grid, voxel, representative: &representative, is_divided: count > 1 };
+    let division = Division::new(world, grid, piece.firsts[..count].iter().map(|&i| all.place(i)));
     let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.triangle(i)));
     let mut probes = 0;
     let mut estimate = |points: u32| {
-        let is_hidden = |p, n| hub.is_hidden(world, p, n);
-        exact.unwrap_or_else(|| cell.coverage(world, points, &is_hidden, &mut probes)) / parts
+        let belongs = |p, n| division.part(p, n) == part;
+        exact.unwrap_or_else(|| cell.coverage(world, points, &belongs, &mut probes)) / sharing
     };
     let is_true = areas == Areas::True;
     c.area = estimate(if is_true { MOST_POINTS } else { FEW_POINTS });

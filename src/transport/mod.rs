@@ -8,6 +8,7 @@ pub mod bridge;
 pub mod camera;
 pub mod cluster;
 pub mod depth;
+mod division;
 pub mod economy;
 mod exchange;
 pub mod glances;

@@ -1,5 +1,7 @@
 //! Sequences in which only some elements are there: a bit for every place, and what there is without gaps.
 
+use rayon::prelude::*;
+
 /// Places that are counted together.
 const WORD: usize = 64;
 
@@ -83,6 +85,22 @@ impl<T> Default for Sparse<T> {
 }
 
 impl<T> Sparse<T> {
+    /// One of so many places, and these elements at theirs, of which no two are the same.
+    pub fn of(mut placed: Vec<(u32, T)>, places: usize) -> Self
+    where
+        T: Send,
+    {
+        placed.par_sort_unstable_by_key(|item| item.0);
+        let mut all = Self::default();
+        all.reserve(places, placed.len());
+        for (place, item) in placed {
+            (all.len()..place as usize).for_each(|_| all.push(None));
+            all.push(Some(item));
+        }
+        (all.len()..places).for_each(|_| all.push(None));
+        all
+    }
+
     /// Places, with an element or without.
     pub fn len(&self) -> usize {
         self.places.len()
@@ -171,6 +189,10 @@ mod tests {
         for (i, item) in all.iter().enumerate() {
             assert_eq!((first.get(i), first.has(i)), (item.as_ref(), item.is_some()));
         }
+        let placed = all.iter().enumerate().filter_map(|(i, item)| Some((i as u32, (*item)?)));
+        let scattered = Sparse::of(placed.rev().collect(), all.len());
+        assert_eq!(scattered.len(), all.len());
+        assert!(all.iter().enumerate().all(|(i, item)| scattered.get(i) == item.as_ref()));
         first.clear();
         assert!(first.is_empty() && first.items().is_empty());
     }

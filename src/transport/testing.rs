@@ -14,7 +14,8 @@ use crate::shading::{CameraRay, Sensor, World};
 use glam::Vec3;
 use std::sync::Arc;
 
-const CAMERA: &str = r#"{"window":[-1,1,-1,1]}"#;
+/// A camera at the origin that looks along -z.
+pub const CAMERA: &str = r#"{"window":[-1,1,-1,1]}"#;
 
 /// Never stopped.
 pub const ON: Cut = Cut(&|| false);
@@ -36,17 +37,28 @@ pub fn place(b: &mut SceneBuilder, points: &[Vec3], faces: &[u32], material: &st
     b.add_instances(group, &[identity]).unwrap();
 }
 
+#[rustfmt::skip]
+const CUBE: [u32; 36] =
+    [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3];
+
+/// The corners of a box.
+fn corners(low: Vec3, high: Vec3) -> Vec<Vec3> {
+    let of = |k: u32| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32);
+    (0..8).map(|k| low + of(k) * (high - low)).collect()
+}
+
+/// Adds a box of one material.
+pub fn cuboid(b: &mut SceneBuilder, low: Vec3, high: Vec3, material: &str) {
+    let outwards: Vec<u32> = CUBE.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
+    place(b, &corners(low, high), &outwards, material);
+}
+
 /// A closed room of one material, with a pane of glass across it.
 pub fn room(wall: &str) -> World {
     let mut b = SceneBuilder::default();
-    let corner = |k: u32| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32) * 2.0 - 1.0;
-    #[rustfmt::skip]
-    let faces = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3];
-    let cube: Vec<Vec3> = (0..8).map(corner).collect();
-    place(&mut b, &cube, &faces, wall);
-    let pane: Vec<Vec3> = cube.iter().map(|p| *p * Vec3::new(0.8, 0.8, 0.05)).collect();
-    let outwards: Vec<u32> = faces.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
-    place(&mut b, &pane, &outwards, r#"{"surface":{"type":"glass","ior":1.5}}"#);
+    place(&mut b, &corners(Vec3::NEG_ONE, Vec3::ONE), &CUBE, wall);
+    let half = Vec3::new(0.8, 0.8, 0.05);
+    cuboid(&mut b, -half, half, r#"{"surface":{"type":"glass","ior":1.5}}"#);
     b.set_camera("camera", CAMERA).unwrap();
     World::new(Arc::new(b.build().unwrap()), false).unwrap()
 }

@@ -16,6 +16,7 @@ use crate::math::SharedExponent;
 use crate::shading::{SurfaceClass, World};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::mem::take;
 
 /// Densities of one arrival, over the area of its cluster.
 #[derive(Clone, Copy, Debug, Default)]
@@ -164,47 +165,31 @@ impl Weights {
     /// Weighs all segments, for an estimator. Returns `false` if it was stopped.
     pub fn weigh(&mut self, s: Sampled, estimator: Estimator, cut: &Cut) -> bool {
         // the lobes' values are most of the memory: not twice
-        self.values.clear();
-        self.owns.clear();
+        *self = Self::default();
         let places = s.clusters.order.len();
-        let mut all_densities = vec![Density::default(); places];
-        let mut all_direct = vec![SharedExponent::default(); places];
-        let (mut densities, mut direct) = (&mut all_densities[..], &mut all_direct[..]);
-        let mut jobs = Vec::new();
-        for clusters in s.clusters.clusters.chunks(BATCH) {
-            let arrivals = clusters.iter().map(|c| (c.cameras + c.lights) as usize).sum();
-            let (here, rest) = std::mem::take(&mut densities).split_at_mut(arrivals);
-            let (lit, unlit) = std::mem::take(&mut direct).split_at_mut(arrivals);
-            (densities, direct) = (rest, unlit);
-            jobs.push((clusters, here, lit));
-        }
-        let weigh =
-            |(clusters, densities, direct)| Batch::weigh(s, clusters, densities, direct, estimator, cut);
-        let batches: Vec<Batch> = jobs.into_par_iter().map(weigh).collect();
+        let mut densities = vec![Density::default(); places];
+        let mut direct = vec![SharedExponent::default(); places];
+        let batches = Batch::all(s, &mut densities, &mut direct, estimator, cut);
         if cut.is_raised() {
             return false;
         }
         // by number, which is how most of what follows goes through them
-        self.densities = s.clusters.by_number(&all_densities, s.clusters.arrivals());
-        drop(all_densities);
+        self.densities = s.clusters.by_number(&densities, s.clusters.arrivals());
+        drop(densities);
         let lit = match estimator {
             Estimator::Literal => s.clusters.arrivals(),
             Estimator::LeaveOneOut | Estimator::WholePath => s.camera.arrivals.len(),
         };
-        self.direct = s.clusters.by_number(&all_direct, lit);
-        drop(all_direct);
-        self.bridged.clear();
-        self.towards_lights.clear();
-        let mut apart: Vec<(u32, f32)> = batches.iter().flat_map(|b| b.apart.iter().copied()).collect();
-        apart.par_sort_unstable_by_key(|a| a.0);
-        self.apart.clear();
-        self.apart.reserve(s.camera.arrivals.len(), apart.len());
-        for (i, apart) in apart {
-            (self.apart.len() as u32..i).for_each(|_| self.apart.push(None));
-            self.apart.push(Some(apart));
-        }
-        (self.apart.len()..s.camera.arrivals.len()).for_each(|_| self.apart.push(None));
-        self.matrices.clear();
+        self.direct = s.clusters.by_number(&direct, lit);
+        drop(direct);
+        let apart = batches.iter().flat_map(|b| b.apart.iter().copied());
+        self.apart = Sparse::of(apart.collect(), s.camera.arrivals.len());
+        self.keep(s, batches);
+        true
+    }
+
+    /// What batches have beside that, one after the other.
+    fn keep(&mut self, s: Sampled, batches: Vec<Batch>) {
         let matrices = batches.iter().map(|b| b.matrices.count()).sum();
         self.matrices.reserve(s.clusters.clusters.len(), matrices);
         for mut batch in batches {
@@ -214,7 +199,6 @@ impl Weights {
             self.values.push(batch.values);
             self.owns.push(batch.owns);
         }
-        true
     }
 
     /// Basic radiance from next-event segments, reflected at camera arrival `i`; at a light arrival, for the literal
@@ -263,6 +247,27 @@ impl Weights {
 }
 
 impl Batch {
+    /// Weighs all clusters. What has a place for every arrival goes to `densities` and `direct`.
+    fn all(
+        s: Sampled,
+        mut densities: &mut [Density],
+        mut direct: &mut [SharedExponent],
+        estimator: Estimator,
+        cut: &Cut,
+    ) -> Vec<Self> {
+        let mut jobs = Vec::new();
+        for clusters in s.clusters.clusters.chunks(BATCH) {
+            let arrivals = clusters.iter().map(|c| (c.cameras + c.lights) as usize).sum();
+            let (here, rest) = take(&mut densities).split_at_mut(arrivals);
+            let (lit, unlit) = take(&mut direct).split_at_mut(arrivals);
+            (densities, direct) = (rest, unlit);
+            jobs.push((clusters, here, lit));
+        }
+        let weigh =
+            |(clusters, densities, direct)| Self::weigh(s, clusters, densities, direct, estimator, cut);
+        jobs.into_par_iter().map(weigh).collect()
+    }
+
     /// Weighs some clusters, whose arrivals follow each other.
     fn weigh(
         s: Sampled,
@@ -282,8 +287,8 @@ impl Batch {
                 break;
             }
             let arrivals = (c.cameras + c.lights) as usize;
-            let (here, rest) = std::mem::take(&mut densities).split_at_mut(arrivals);
-            let (lit, unlit) = std::mem::take(&mut direct).split_at_mut(arrivals);
+            let (here, rest) = take(&mut densities).split_at_mut(arrivals);
+            let (lit, unlit) = take(&mut direct).split_at_mut(arrivals);
             (densities, direct) = (rest, unlit);
             let mut places = Places { densities: here, direct: lit, apart: vec![1.0; c.cameras as usize] };
             batch.matrices.push((c.class != SurfaceClass::Diffuse).then(|| Matrix {

@@ -84,6 +84,22 @@ def junk(s: Stage) -> None:
     s.mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [1, 1, 0]], [0, 1, 2, 1, 2, 3], DIFFUSE)
 
 
+@case(GROUP, "path tracing")
+def rounded(full: bool) -> Rows:
+    """A cube that is smooth by its normals alone, which lean up to 55 degrees off its faces."""
+    s = Stage()
+    corners = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
+    s.mesh(corners, triangles, DIFFUSE, smooth=True)
+    s.light("dome", radiance=[1, 1, 1])
+    s.camera([1.2, -2.0, 1.4], [0, 0, 0], 0.3)
+    size = (32, 16, 6)
+    reference = s.means(32, 256, 6, integrator="path")
+    for method in ("segment", "photon-filter") if full else ("segment",):
+        yield beside(method, reference, s.means(*size, integrator=method), 0.02)
+
+
 @case(GROUP, "the floor without them: albedo under a white sky")
 def triangles(full: bool) -> Rows:
     """Degenerate, duplicated, needle-thin and coplanar triangles, and one that fills the view."""

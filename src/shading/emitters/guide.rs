@@ -52,7 +52,7 @@ const NARROWEST: f32 = 1.0 / 4096.0;
 
 #[derive(Clone, Copy, Debug)]
 enum Node {
-    /// `first`: share of the first child in what the guide draws here.
+    /// `first`: share of the first child in what the guide draws here; `second`: places from here to the other.
     Inner { split: Split, first: f64, second: u32 },
     /// The density in it.
     Leaf { relative: f32 },
@@ -133,7 +133,7 @@ impl EmissionGuide {
         let mut guide = Self::default();
         if lessons.len() >= LEAST && total > 0.0 {
             let learning = Learning { emitters, total };
-            learning.grow(&mut guide.nodes, &mut lessons, Cell::whole(emitters), 0);
+            guide.nodes = learning.grow(&mut lessons, Cell::whole(emitters), 0);
         }
         guide
     }
@@ -158,7 +158,8 @@ impl EmissionGuide {
             if choice < first {
                 (cell, node, choice) = (children[0], node + 1, choice / first);
             } else {
-                (cell, node, choice) = (children[1], second as usize, (choice - first) / (1.0 - first));
+                (cell, node, choice) =
+                    (children[1], node + second as usize, (choice - first) / (1.0 - first));
             }
         }
         let [first, end] = cell.emitters;
@@ -177,7 +178,7 @@ impl EmissionGuide {
         loop {
             match self.nodes[node] {
                 Node::Inner { split, .. } if split.is_first(draw) => node += 1,
-                Node::Inner { second, .. } => node = second as usize,
+                Node::Inner { second, .. } => node += second as usize,
                 Node::Leaf { relative } => return relative,
             }
         }
@@ -197,25 +198,24 @@ struct Learning<'a> {
 }
 
 impl Learning<'_> {
-    fn grow(&self, nodes: &mut Vec<Node>, lessons: &mut [Lesson], cell: Cell, depth: u32) {
+    /// The tree of a box.
+    fn grow(&self, lessons: &mut [Lesson], cell: Cell, depth: u32) -> Vec<Node> {
         let share = worth(lessons) / self.total;
         let volume = cell.volume(self.emitters);
         let is_leaf = lessons.len() < LEAST || share < SMALLEST || depth == DEPTH;
         let Some(split) = (!is_leaf).then(|| self.best_split(lessons, &cell)).flatten() else {
             let guided = if volume > 0.0 { share / volume } else { 0.0 };
-            nodes.push(Node::Leaf { relative: (1.0 - SHARE + SHARE * guided) as f32 });
-            return;
+            return vec![Node::Leaf { relative: (1.0 - SHARE + SHARE * guided) as f32 }];
         };
-        let at = nodes.len();
-        nodes.push(Node::Leaf { relative: 0.0 });
         lessons.sort_by_key(|l| !split.is_first(&l.draw));
         let (first, second) = lessons.split_at_mut(lessons.partition_point(|l| split.is_first(&l.draw)));
-        let children = cell.children(split);
+        let [near, far] = cell.children(split);
         let part = worth(first) / (worth(first) + worth(second));
-        self.grow(nodes, first, children[0], depth + 1);
-        let behind = nodes.len() as u32;
-        self.grow(nodes, second, children[1], depth + 1);
-        nodes[at] = Node::Inner { split, first: part, second: behind };
+        let (below, beyond) =
+            rayon::join(|| self.grow(first, near, depth + 1), || self.grow(second, far, depth + 1));
+        let mut nodes = vec![Node::Inner { split, first: part, second: below.len() as u32 + 1 }];
+        nodes.extend(below.into_iter().chain(beyond));
+        nodes
     }
 
     /// The split that tells most: whose parts are furthest from having what their volume promises.
