@@ -24,12 +24,10 @@ class Picture:
     Attributes:
         pixels: (h, w, c), 1 to 4 channels, uint8, uint16, float16 or float32, row 0 on top; colour
             is not multiplied by alpha, and not decoded.
-        colorspace: the file's own word on its colour space, or "".
         wrap: the file's word on tiling in s and t, as in OpenEXR's `wrapmodes`, or "".
     """
 
     pixels: np.ndarray
-    colorspace: str
     wrap: str
 
     @property
@@ -98,13 +96,12 @@ def _read_file(path: str) -> Picture:
         if pixels is None:
             raise ImageError(file.geterror() or f"{path} cannot be read")
         wrap = spec.getattribute("wrapmodes") or ""
-        colorspace = spec.getattribute("oiio:ColorSpace") or ""
     finally:
         file.close()
     pixels = np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
     if channels != list(range(spec.nchannels)):
         pixels = np.ascontiguousarray(pixels[:, :, channels])
-    return Picture(pixels, str(colorspace), str(wrap))
+    return Picture(pixels, str(wrap))
 
 
 def _channels(names: list[str]) -> list[int]:

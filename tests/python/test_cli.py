@@ -244,6 +244,22 @@ def test_signals_save_what_was_rendered(stage, tmp_path, number):
     assert json.loads((tmp_path / "s.json").read_text())["samples"] > 0
 
 
+def test_the_engines_warnings_are_said(tmp_path):
+    path = tmp_path / "closed.usda"
+    path.write_text(
+        '#usda 1.0\ndef Camera "Camera" { }\ndef Sphere "Ball" { }\n'
+        'def SphereLight "Lamp" (\nprepend apiSchemas = ["ShapingAPI"]\n) {\n'
+        "float inputs:shaping:cone:angle = 0\n}\n"
+    )
+    dropped = 'light "/Lamp": dropped, it emits nothing: its cone is closed'
+    _, err = run("render", path, "-o", tmp_path / "a.exr", "--samples", 1, "--resolution", "8x8")
+    assert err.count(dropped) == 1
+    assert "nothing emits light" in err
+    out, _ = run("info", path)
+    assert out.count(dropped) == 1
+    assert "Everything in the stage is supported" not in out
+
+
 def test_info(stage):
     out, _ = run("info", stage)
     assert "/Camera" in out

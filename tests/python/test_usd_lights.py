@@ -276,6 +276,37 @@ def test_lights_that_do_not_shine_are_said(body, kind):
     assert [path for path, _ in reported(imported, kind)] == ["/L"]
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "def DistantLight \"L\" {\nfloat inputs:intensity.timeSamples = {1: 0, 2: 3}\n}\n",
+        'def SphereLight "L" {\ntoken visibility = "invisible"\n}\n',
+        'def SphereLight "L" {\nfloat inputs:intensity = -1\n}\n',
+        'def PortalLight "L" { }\n',
+        'def Volume "V" (\nprepend apiSchemas = ["VolumeLightAPI"]\n) { }\n',
+        'def Material "Look" {\ntoken outputs:surface.connect = </Look/S.outputs:surface>\n'
+        'def Shader "S" {\nuniform token info:id = "UsdPreviewSurface"\n'
+        "color3f inputs:emissiveColor.timeSamples = {1: (0, 0, 0), 2: (2, 2, 2)}\n"
+        "token outputs:surface\n}\n}\n",
+    ],
+)
+def test_a_stage_whose_lights_are_off_is_dark(body):
+    scene, imported = load(body + 'def Camera "Camera" { }', plain=True, frame=1)
+    assert scene.lights == {}
+    assert reported(imported, usd.Kind.NOTE) == []
+
+
+def test_a_black_emission_is_no_light():
+    scene, _ = load(
+        'def Material "Look" {\ntoken outputs:surface.connect = </Look/S.outputs:surface>\n'
+        'def Shader "S" {\nuniform token info:id = "UsdPreviewSurface"\n'
+        "color3f inputs:emissiveColor = (0, 0, 0)\ntoken outputs:surface\n}\n}\n"
+        'def Camera "Camera" { }',
+        plain=True,
+    )
+    assert set(scene.lights) == {"default sky", "default lamp"}
+
+
 def test_a_stage_without_lights_gets_some():
     body = f'def Camera "Camera" {{ }}\ndef Mesh "M" {{ {QUAD} }}'
     scene, imported = load(body, plain=True)

@@ -97,6 +97,7 @@ def gradient(channels, dtype=np.uint8):
         ("t.exr", np.float32, 4, "raw", "raw"),
         ("t.tif", np.uint8, 3, "auto", "srgb"),
         ("t.tga", np.uint8, 4, "auto", "srgb"),
+        ("t.png", np.uint8, 1, "sRGB", "srgb"),
     ],
 )
 def test_pixels_arrive_as_they_are(tmp_path, name, dtype, channels, space, expected):
@@ -112,11 +113,14 @@ def test_pixels_arrive_as_they_are(tmp_path, name, dtype, channels, space, expec
     assert imported.report.entries == []
 
 
-def test_a_grey_byte_picture_is_raw(tmp_path):
-    write(tmp_path / "t.tif", gradient(1))
-    scene, _ = import_network(tmp_path, "asset inputs:file = @./t.tif@")
+@pytest.mark.parametrize(
+    ("name", "channels"), [("t.tif", 1), ("t.png", 1), ("t.png", 2), ("t.jpg", 1)]
+)
+def test_a_grey_byte_picture_is_raw(tmp_path, name, channels):
+    write(tmp_path / name, gradient(channels))
+    scene, _ = import_network(tmp_path, f"asset inputs:file = @./{name}@")
     assert scene.images[0][2] == "raw"
-    assert scene.images[0][1].shape == (4, 6, 1)
+    assert scene.images[0][1].shape == (4, 6, channels)
 
 
 def test_the_texture(tmp_path):
@@ -219,6 +223,27 @@ def test_a_chain_of_transforms(tmp_path):
     )
     # Moved first, scaled afterwards.
     assert scene.textures[0]["transform"] == pytest.approx([10, 0, 10, 0, 10, 20])
+
+
+@pytest.mark.parametrize("ring", [("X",), ("X", "Y"), ("X", "Y", "Z")])
+def test_coordinates_that_depend_on_themselves(tmp_path, ring):
+    write(tmp_path / "t.png", gradient(3))
+    node = (
+        'def Shader "%s" {\nuniform token info:id = "UsdTransform2d"\n'
+        "float2 inputs:in.connect = </Look/%s.outputs:result>\n"
+        "float2 inputs:scale = (3, 3)\nfloat2 outputs:result\n}\n"
+    )
+    following = dict(zip(ring, (*ring[1:], ring[0])))
+    scene, imported = import_network(
+        tmp_path,
+        "asset inputs:file = @./t.png@",
+        st="X",
+        more="".join(node % pair for pair in following.items()),
+    )
+    assert (scene.textures[0]["uv"], scene.textures[0]["transform"]) == ("st", [1, 0, 0, 0, 1, 0])
+    assert ("/Look/X", "texture coordinates that depend on themselves") in reported(
+        imported, usd.Kind.WARNING
+    )
 
 
 @pytest.mark.parametrize(("authored", "number"), [(False, 0.5), (True, 0.25)])

@@ -223,9 +223,16 @@ def _render_frame(
         for point in stats.get("curve", []):
             point.setdefault("mape", None)
             point.setdefault("relmse", None)
+    _say(options, _engine_warnings(stats))
     written = output.write(render, path, {"segue:stage": str(options.stage)})
     _say(options, _summary(stats, written))
     return stats
+
+
+def _engine_warnings(stats: dict[str, Any]) -> str:
+    """What the engine repaired or dropped of what it was given, each once."""
+    found = dict.fromkeys(stats.get("warnings", ()))
+    return "\n".join(["Warnings:", *(f"  - {w}" for w in found)]) if found else ""
 
 
 def _summary(stats: dict[str, Any], written: list[Path]) -> str:

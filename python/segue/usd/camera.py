@@ -1,4 +1,4 @@
-"""Cameras and render settings: what the picture shows, and at which size."""
+"""Cameras: what the picture shows, and at which size."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ._pxr import Gf, Sdf, Usd, UsdGeom, UsdRender
+from ._pxr import Gf, Sdf, Usd, UsdGeom
+from .properties import Properties
+from .render_settings import Settings
 from .report import Report
-from .transform import column_matrix, flat, without_scale
+from .transform import column_matrix, flat, is_usable, without_scale
 
 #: UsdGeomCamera's apertures and focal length are in tenths of a scene unit.
 TENTH = 0.1
@@ -20,55 +22,8 @@ LONGEST = 1e9
 DEFAULT_WIDTH = 1280
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What the stage says of the picture.
-
-    Attributes:
-        resolution: width and height, or None.
-        camera: path of the camera, or "".
-        pixel_aspect: width of a pixel over its height.
-        policy: UsdRender's aspectRatioConformPolicy.
-        data_window: part of the frame to render: x0, y0, x1, y1 from the bottom left, in [0, 1].
-    """
-
-    resolution: tuple[int, int] | None = None
-    camera: str = ""
-    pixel_aspect: float = 1.0
-    policy: str = "expandAperture"
-    data_window: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
-
-
-def read_settings(stage: Usd.Stage, time: Usd.TimeCode, report: Report) -> Settings:
-    """The render settings that the stage names, else those at /Render/Settings, else defaults."""
-    settings = UsdRender.Settings.GetStageRenderSettings(stage)
-    if not settings:
-        settings = UsdRender.Settings(stage.GetPrimAtPath("/Render/Settings"))
-    if not settings:
-        return Settings()
-    prim = settings.GetPrim()
-    width, height = settings.GetResolutionAttr().Get(time)
-    if width <= 0 or height <= 0:
-        report.warning(prim, f"the resolution {width} x {height}", "the default is used")
-        resolution = None
-    else:
-        resolution = (int(width), int(height))
-    cameras = settings.GetCameraRel().GetForwardedTargets()
-    aspect = float(settings.GetPixelAspectRatioAttr().Get(time))
-    window = tuple(float(v) for v in settings.GetDataWindowNDCAttr().Get(time))
-    inside = (max(window[0], 0.0), max(window[1], 0.0), min(window[2], 1.0), min(window[3], 1.0))
-    if inside != window:
-        report.unsupported(prim, f"overscan, the data window {window}", "it is cut to the frame")
-    if inside[0] >= inside[2] or inside[1] >= inside[3]:
-        report.warning(prim, f"the empty data window {window}", "the whole frame is drawn")
-        inside = (0.0, 0.0, 1.0, 1.0)
-    return Settings(
-        resolution,
-        str(cameras[0]) if cameras else "",
-        aspect if aspect > 0 else 1.0,
-        str(settings.GetAspectRatioConformPolicyAttr().Get(time)),
-        inside,
-    )
+class CameraError(Exception):
+    """A camera does not exist or cannot be used; the text names it."""
 
 
 def find_camera(
@@ -77,7 +32,7 @@ def find_camera(
     """The camera that was asked for, else the settings' one, else the stage's first.
 
     Raises:
-        LookupError: the camera that was asked for does not exist.
+        CameraError: the camera that was asked for does not exist.
     """
     if wanted:
         return _named_camera(stage, wanted)
@@ -111,7 +66,7 @@ def _named_camera(stage: Usd.Stage, wanted: str) -> Usd.Prim:
         if prim.GetName() == wanted:
             return prim
     known = ", ".join(str(p.GetPath()) for p in cameras) or "none"
-    raise LookupError(f"there is no camera {wanted}; the stage's cameras: {known}")
+    raise CameraError(f"there is no camera {wanted}; the stage's cameras: {known}")
 
 
 def conform(
@@ -140,14 +95,21 @@ def conform(
     return cx - 0.5 * width, cx + 0.5 * width, cy - 0.5 * height, cy + 0.5 * height
 
 
-def exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
+def exposure_scale(camera: UsdGeom.Camera, properties: Properties) -> float:
     """The factor from radiance to pixel values.
 
     Newer USD has a photometric model of which `exposure` is one part; older has the latter alone.
     """
     if hasattr(camera, "ComputeLinearExposureScale"):
-        return float(camera.ComputeLinearExposureScale(time))
-    return 2.0 ** float(camera.GetExposureAttr().Get(time) or 0.0)
+        scale = float(camera.ComputeLinearExposureScale(properties.time))
+    else:
+        scale = float(np.exp2(float(properties.get(camera.GetExposureAttr()))))
+    if 0 <= scale < math.inf:
+        return scale
+    properties.report.warning(
+        camera.GetPrim(), f"an exposure that multiplies by {scale:g}", "1 is used"
+    )
+    return 1.0
 
 
 @dataclass(frozen=True)
@@ -174,18 +136,21 @@ def _is_length(value: float) -> bool:
 
 def read_camera(
     prim: Usd.Prim,
-    time: Usd.TimeCode,
+    properties: Properties,
     settings: Settings,
     resolution: tuple[int, int] | None,
-    report: Report,
 ) -> Frame:
-    """A UsdGeomCamera. A resolution given by hand keeps the picture's width in the scene."""
-    camera = UsdGeom.Camera(prim)
+    """A UsdGeomCamera. A resolution given by hand keeps the picture's width in the scene.
 
-    def get(attribute: Usd.Attribute) -> Any:
-        return attribute.Get(time)
-
-    world = column_matrix(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time))
+    Raises:
+        CameraError: it stands nowhere.
+    """
+    camera, get, report = UsdGeom.Camera(prim), properties.get, properties.report
+    world = column_matrix(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(properties.time))
+    if not is_usable(world[None])[0]:
+        raise CameraError(
+            f"the transformation of the camera {prim.GetPath()} is singular or not finite"
+        )
     rigid, lengths = without_scale(world)
     if not np.allclose(lengths, lengths[0], rtol=1e-4):
         report.unsupported(prim, "a camera with a non-uniform scale", "its scale is left away")
@@ -217,15 +182,10 @@ def read_camera(
         "transform": flat(rigid),
         "window": list(window),
     }
-    clipping = camera.GetClippingRangeAttr()
-    near, far = (float(v) for v in get(clipping))
-    description["near"] = max(near, 0.0)
-    # The schema's fallback for the far plane only says that nothing was said.
-    if clipping.HasAuthoredValue() and math.isfinite(far) and far > near:
-        description["far"] = far
+    description.update(_clipping(camera, properties))
     stop = float(get(camera.GetFStopAttr()))
     distance = float(get(camera.GetFocusDistanceAttr()))
-    if stop > 0 and not orthographic:
+    if settings.has_lens and stop > 0 and not orthographic:
         if _is_length(stop) and 0 < distance < math.inf:
             description["aperture_radius"] = 0.5 * focal * TENTH / stop
             description["focus_distance"] = distance
@@ -233,9 +193,26 @@ def read_camera(
             report.warning(
                 prim, f"fStop {stop:g} with focusDistance {distance:g}", "everything is in focus"
             )
-    if len(camera.GetClippingPlanesAttr().Get(time) or ()):
+    if len(get(camera.GetClippingPlanesAttr())):
         report.unsupported(prim, "clipping planes", "they are ignored")
     return Frame(str(prim.GetPath()), description, size, _crop(size, settings))
+
+
+def _clipping(camera: UsdGeom.Camera, properties: Properties) -> dict[str, float]:
+    """The near and far planes. The schema's fallbacks only say that nothing was said."""
+    clipping = camera.GetClippingRangeAttr()
+    if not clipping.HasAuthoredValue():
+        return {"near": 0.0}
+    near, far = (float(v) for v in properties.get(clipping))
+    if not math.isfinite(near):
+        properties.report.warning(
+            camera.GetPrim(), f"the clippingRange ({near:g}, {far:g})", "nothing is cut off"
+        )
+        return {"near": 0.0}
+    planes = {"near": max(near, 0.0)}
+    if math.isfinite(far) and far > near:
+        planes["far"] = far
+    return planes
 
 
 def _size(

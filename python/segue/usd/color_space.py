@@ -6,7 +6,7 @@ from ._pxr import Usd
 from .report import Report
 
 #: Names of linear Rec.709 with D65 white, and of what says nothing.
-_LINEAR_REC709 = ("", "lin_rec709_scene", "lin_rec709", "lin_srgb", "identity", "data", "raw")
+LINEAR_REC709 = ("", "lin_rec709_scene", "lin_rec709", "lin_srgb", "identity", "data", "raw")
 
 
 def check_color_space(prim: Usd.Prim, report: Report) -> None:
@@ -14,5 +14,5 @@ def check_color_space(prim: Usd.Prim, report: Report) -> None:
     if not hasattr(Usd, "ColorSpaceAPI"):  # USD before 25.2
         return
     name = str(Usd.ColorSpaceAPI.ComputeColorSpaceName(prim, None))
-    if name not in _LINEAR_REC709:
+    if name not in LINEAR_REC709:
         report.unsupported(prim, f"colours in the space '{name}'", "read as linear Rec.709")

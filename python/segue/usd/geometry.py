@@ -11,11 +11,11 @@ from ..errors import BadSceneError
 from ..scene import Scene
 from . import primvar
 from ._pxr import Sdf, Usd, UsdGeom, UsdLux
-from .light import Lights, is_normalized, radiance
+from .light import Lights, is_normalized
 from .material import GREY, Materials, Surface, with_emission
 from .mesh import add_attributes, read_mesh
 from .mesh_data import MeshData, area
-from .report import Report
+from .properties import Properties
 from .shapes import shape_of
 from .transform import is_usable
 from .walk import Item
@@ -43,15 +43,15 @@ class Geometry:
         scene: Scene,
         materials: Materials,
         lights: Lights,
-        time: Usd.TimeCode,
-        report: Report,
+        properties: Properties,
         gain: float,
     ) -> None:
         self._scene = scene
         self._materials = materials
         self._lights = lights
-        self._time = time
-        self._report = report
+        self._properties = properties
+        self._time = properties.time
+        self._report = properties.report
         self._gain = gain
         self._meshes: dict[Any, int | None] = {}
         self._data: dict[Any, MeshData | None] = {}
@@ -83,7 +83,7 @@ class Geometry:
             if data is not None:
                 self._add_shape(key, data, item, item.transforms)
             return
-        shape = shape_of(prim, self._time)
+        shape = shape_of(prim, self._properties)
         if shape is None:
             what = _NOT_DRAWN.get(kind, f"prims of the type '{kind}'")
             self._report.unsupported(prim, what, "left out")
@@ -104,16 +104,16 @@ class Geometry:
         # Inside an instance the subsets are those of the proxy that the bindings are asked of.
         slots = _slots_of(prim, data)
         surfaces = [self._surface(slot, prim, data) for slot in slots]
-        light = self._light_of(prim)
+        light, level = self._light_of(prim)
         needed = frozenset().union(*(s.primvars for s in surfaces))
         number = self._mesh(key, data, prim, needed)
         if number is None:
             return
         self._count += 1
         two_sided = bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get(self._time))
-        for group, level in self._emission(light, data, transforms):
-            ids = [self._material(s, light, level) for s in surfaces]
-            if level is not None or any(s.emission is not None for s in surfaces):
+        for group, strength in self._emission(light, level, data, transforms):
+            ids = [self._material(s, light, strength) for s in surfaces]
+            if strength is not None or any(s.emission is not None for s in surfaces):
                 self.emitters += 1
             self._scene.add_instances(
                 str(prim.GetPath()),
@@ -181,25 +181,34 @@ class Geometry:
         if values.interpolation != "constant":
             return None
         first = [float(v) for v in values.flattened()[0]]
-        return first[0] if name == "displayOpacity" else first
+        if name == "displayOpacity":
+            return first[0]
+        # As textures read attributes: one number is a grey.
+        return (first * 3 if len(first) == 1 else [*first, 0.0])[:3]
 
-    def _light_of(self, prim: Usd.Prim) -> UsdLux.LightAPI | None:
+    def _light_of(self, prim: Usd.Prim) -> tuple[UsdLux.LightAPI | None, np.ndarray | None]:
+        """The light that a gprim is, and its radiance; nothing if it is none that can shine."""
         source = self.geometry_lights.get(prim.GetPath())
-        if source is not None:
-            return UsdLux.LightAPI(source)
-        if not prim.HasAPI(UsdLux.LightAPI) and not prim.HasAPI(UsdLux.MeshLightAPI):
-            return None
-        self._lights.check(prim)
-        return UsdLux.LightAPI(prim)
+        if source is None:
+            if not prim.HasAPI(UsdLux.LightAPI) and not prim.HasAPI(UsdLux.MeshLightAPI):
+                return None, None
+            source = prim
+            self._lights.check(prim)
+        light = UsdLux.LightAPI(source)
+        level = self._lights.level(source, light)
+        return (light, level) if level is not None else (None, None)
 
     def _emission(
-        self, light: UsdLux.LightAPI | None, data: MeshData, transforms: np.ndarray
+        self,
+        light: UsdLux.LightAPI | None,
+        level: np.ndarray | None,
+        data: MeshData,
+        transforms: np.ndarray,
     ) -> list[tuple[np.ndarray, np.ndarray | None]]:
         """The instances with the radiance of their light: one group unless it is normalised."""
-        if light is None:
+        if light is None or level is None:
             return [(transforms, None)]
-        level = self._gain * radiance(light, self._time)
-        if not is_normalized(light, self._time):
+        if not is_normalized(light, self._properties):
             return [(transforms, level)]
         groups: dict[float, list[np.ndarray]] = {}
         for matrix in transforms:
@@ -211,7 +220,7 @@ class Geometry:
     ) -> int:
         if light is None or level is None:
             return self._materials.add(surface, self._gain)
-        mode = light.GetMaterialSyncModeAttr().Get(self._time)
+        mode = self._properties.get(light.GetMaterialSyncModeAttr())
         strength = [float(v) for v in level]
         if mode == "noMaterialResponse":
             surface = replace(surface, closure={"type": "diffuse", "color": 0}, emission=None)

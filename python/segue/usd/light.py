@@ -11,34 +11,43 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import BadArgumentError, BadSceneError
 from ..scene import Scene
-from ._pxr import Tf, Usd, UsdGeom, UsdLux
+from ._pxr import Sdf, Tf, Usd, UsdGeom, UsdLux
 from .color_space import check_color_space
-from .report import Report
+from .properties import Properties
 from .texture import Textures
 from .transform import flat, is_usable, without_scale
 
 #: Turns the dome's +Y pole to +Z; longitude 0 then points to -Y (UsdLuxDomeLight_1).
 _POLE_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
+#: Lights infinitely far away, which have no shape.
+_INFINITE = ("DistantLight", "DomeLight", "DomeLight_1")
+
 #: Gauss-Legendre points along, and points around, for areas of stretched shapes.
 _ALONG, _AROUND = 64, 256
 
 
-def radiance(light: UsdLux.LightAPI, time: Usd.TimeCode) -> np.ndarray:
+class _UnusableError(Exception):
+    """A light cannot be drawn; the text is the attribute and its value."""
+
+
+def radiance(light: UsdLux.LightAPI, properties: Properties) -> np.ndarray:
     """L of UsdLuxLightAPI before normalisation, for each channel."""
-    color = np.array(light.GetColorAttr().Get(time), dtype=np.float64)
-    if light.GetEnableColorTemperatureAttr().Get(time):
-        kelvin = light.GetColorTemperatureAttr().Get(time)
+    get = properties.get
+    color = np.array(get(light.GetColorAttr()), dtype=np.float64)
+    if get(light.GetEnableColorTemperatureAttr()):
+        kelvin = get(light.GetColorTemperatureAttr())
         color *= np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
-    intensity = float(light.GetIntensityAttr().Get(time))
-    exposure = float(light.GetExposureAttr().Get(time))
+    intensity = float(get(light.GetIntensityAttr()))
+    exposure = float(get(light.GetExposureAttr()))
     return intensity * np.exp2(exposure) * color
 
 
-def is_normalized(light: UsdLux.LightAPI, time: Usd.TimeCode) -> bool:
+def is_normalized(light: UsdLux.LightAPI, properties: Properties) -> bool:
     """Whether the radiance is divided by the light's size."""
-    return bool(light.GetNormalizeAttr().Get(time))
+    return bool(properties.get(light.GetNormalizeAttr()))
 
 
 def rect_area(width: float, height: float, matrix: np.ndarray) -> float:
@@ -99,15 +108,14 @@ class Lights:
         self,
         scene: Scene,
         textures: Textures,
-        time: Usd.TimeCode,
-        report: Report,
+        properties: Properties,
         gain: float,
         z_up: bool,
     ) -> None:
         self._scene = scene
         self._textures = textures
-        self._time = time
-        self._report = report
+        self._properties = properties
+        self._report = properties.report
         self._gain = gain
         self._z_up = z_up
         self.count = 0
@@ -130,38 +138,50 @@ class Lights:
             return
         light = UsdLux.LightAPI(prim)
         self.check(prim)
-        level = self._gain * radiance(light, self._time)
-        if not np.isfinite(level.astype(np.float32)).all() or (level < 0).any():
-            self._report.warning(prim, "a radiance that is negative or not finite", "left out")
+        level = self.level(prim, light)
+        if level is None:
             return
         if not level.any():
             self._report.left_out(prim, "a light of intensity or colour 0")
             return
-        shape = self._shape_keys(prim)
         usable = is_usable(transforms) if kind not in ("DomeLight", "DomeLight_1") else None
         for number, matrix in enumerate(transforms):
             if usable is not None and not usable[number]:
                 self._report.left_out(prim, "a light without volume")
                 continue
-            description = make(prim, light, level, matrix)
-            if description is None:
-                continue
-            if kind not in ("DistantLight", "DomeLight", "DomeLight_1"):
-                description.update(shape)
             name = str(prim.GetPath()) + (f"[{number}]" if len(transforms) > 1 else "")
-            self._scene.add_light(name, description)
+            try:
+                shape = self._shape_keys(prim)
+                description = make(prim, light, level, matrix)
+                if description is None:
+                    continue
+                self._scene.add_light(name, {**description, **shape})
+            except (_UnusableError, BadSceneError, BadArgumentError) as error:
+                self._report.warning(prim, str(error), "left out")
+                continue
             self.count += 1
+
+    def level(self, prim: Usd.Prim, light: UsdLux.LightAPI) -> np.ndarray | None:
+        """A light's radiance with the exposure, or None, with a warning, if it is none."""
+        level = self._gain * radiance(light, self._properties)
+        if np.isfinite(level.astype(np.float32)).all() and (level >= 0).all():
+            return level
+        channels = ", ".join(f"{v:g}" for v in level)
+        self._report.warning(
+            prim, f"a radiance that is negative or not finite ({channels})", "left out"
+        )
+        return None
 
     def check(self, prim: Usd.Prim) -> None:
         """Reports what a light asks for and does not get."""
-        light, time, report = UsdLux.LightAPI(prim), self._time, self._report
+        light, get, report = UsdLux.LightAPI(prim), self._properties.get, self._report
         check_color_space(prim, report)
         for name, attribute in (
             ("diffuse", light.GetDiffuseAttr()),
             ("specular", light.GetSpecularAttr()),
         ):
-            factor = attribute.Get(time)
-            if factor is not None and factor != 1:
+            factor = get(attribute) if attribute else 1
+            if factor != 1:
                 report.unsupported(
                     prim, f"the {name} multiplier {factor:g} of a light", "1 is used"
                 )
@@ -169,8 +189,8 @@ class Lights:
             ("light linking", light.GetLightLinkCollectionAPI()),
             ("shadow linking", light.GetShadowLinkCollectionAPI()),
         ):
-            root = collection.GetIncludeRootAttr().Get(time)
-            if root is False or collection.GetExcludesRel().GetTargets():
+            root = collection.GetIncludeRootAttr()
+            if (root and get(root) is False) or collection.GetExcludesRel().GetTargets():
                 report.unsupported(prim, name, "the light shines on everything")
         if light.GetFiltersRel().GetTargets():
             report.unsupported(prim, "light filters", "they are ignored")
@@ -181,25 +201,36 @@ class Lights:
                 )
         if prim.HasAPI(UsdLux.ShadowAPI):
             shadow = UsdLux.ShadowAPI(prim)
-            color = shadow.GetShadowColorAttr().Get(time)
             if (
-                shadow.GetShadowEnableAttr().Get(time) is False
-                or (color is not None and any(color))
-                or (shadow.GetShadowDistanceAttr().Get(time) or -1) > 0
+                not get(shadow.GetShadowEnableAttr())
+                or any(get(shadow.GetShadowColorAttr()))
+                or get(shadow.GetShadowDistanceAttr()) > 0
             ):
                 report.unsupported(prim, "a light without true shadows", "its shadows are true")
 
     def _normalized(self, light: UsdLux.LightAPI, level: np.ndarray, area: float) -> np.ndarray:
-        return level / area if is_normalized(light, self._time) and area > 0 else level
+        return level / area if is_normalized(light, self._properties) and area > 0 else level
 
     def _get(self, prim: Usd.Prim, name: str) -> Any:
-        return prim.GetAttribute(name).Get(self._time)
+        return self._properties.named(prim, name)
+
+    def _number(self, prim: Usd.Prim, name: str) -> float:
+        value = float(self._get(prim, name))
+        if not math.isfinite(value):
+            raise _UnusableError(f"{name} = {value:g}, which is not finite")
+        return value
+
+    def _length(self, prim: Usd.Prim, name: str) -> float:
+        value = self._number(prim, name)
+        if value < 0:
+            raise _UnusableError(f"{name} = {value:g}, which is negative")
+        return value
 
     def _rect(
         self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
     ) -> dict[str, Any] | None:
-        width = float(self._get(prim, "inputs:width"))
-        height = float(self._get(prim, "inputs:height"))
+        width = self._length(prim, "inputs:width")
+        height = self._length(prim, "inputs:height")
         area = rect_area(width, height, matrix)
         if not area > 0:
             self._no_area(prim)
@@ -219,7 +250,7 @@ class Lights:
     def _disk(
         self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
     ) -> dict[str, Any] | None:
-        radius = float(self._get(prim, "inputs:radius"))
+        radius = self._length(prim, "inputs:radius")
         area = disk_area(radius, matrix)
         if not area > 0:
             self._no_area(prim)
@@ -234,9 +265,9 @@ class Lights:
     def _sphere(
         self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
     ) -> dict[str, Any] | None:
-        radius = float(self._get(prim, "inputs:radius"))
+        radius = self._length(prim, "inputs:radius")
         area = sphere_area(radius, matrix)
-        normalized = is_normalized(light, self._time)
+        normalized = is_normalized(light, self._properties)
         if self._get(prim, "treatAsPoint") or not area > 0:
             # A convex body of radiance L and area A has L A / 4 of intensity on average over the
             # directions (Cauchy); normalised, A cancels.
@@ -255,9 +286,9 @@ class Lights:
     def _cylinder(
         self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
     ) -> dict[str, Any] | None:
-        radius = float(self._get(prim, "inputs:radius"))
-        length = float(self._get(prim, "inputs:length"))
-        if not radius > 0 and length > 0 and is_normalized(light, self._time):
+        radius = self._length(prim, "inputs:radius")
+        length = self._length(prim, "inputs:length")
+        if not radius > 0 and length > 0 and is_normalized(light, self._properties):
             radius = length * 1e-3
             self._report.unsupported(prim, "a line light", f"a cylinder of radius {radius:g}")
         area = cylinder_area(radius, length, matrix)
@@ -275,7 +306,7 @@ class Lights:
     def _distant(
         self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
     ) -> dict[str, Any] | None:
-        degrees = float(np.clip(self._get(prim, "inputs:angle"), 0, 360))
+        degrees = min(max(self._number(prim, "inputs:angle"), 0.0), 360.0)
         angle = math.radians(degrees)
         if angle > math.pi:
             angle = math.pi
@@ -283,7 +314,7 @@ class Lights:
                 prim, f"a DistantLight of {degrees:g} degrees", "180 degrees are used"
             )
         # A parallel light has no radiance; UsdLux reads its value as irradiance either way.
-        parallel = angle == 0 or is_normalized(light, self._time)
+        parallel = angle == 0 or is_normalized(light, self._properties)
         return {
             "type": "distant",
             "angle": angle,
@@ -318,16 +349,22 @@ class Lights:
         """The ABI's `shaping` of a light with UsdLuxShapingAPI."""
         if not prim.HasAPI(UsdLux.ShapingAPI):
             return {}
-        shaping, time = UsdLux.ShapingAPI(prim), self._time
-        file = shaping.GetShapingIesFileAttr().Get(time)
-        if file and file.path:
+        file = self._get(prim, "inputs:shaping:ies:file")
+        if isinstance(file, Sdf.AssetPath) and file.path:
             self._report.unsupported(prim, f"the IES profile {file.path}", "it is ignored")
-        angle = min(max(float(shaping.GetShapingConeAngleAttr().Get(time)), 0.0), 180.0)
-        softness = min(max(float(shaping.GetShapingConeSoftnessAttr().Get(time)), 0.0), 1.0)
-        focus = max(float(shaping.GetShapingFocusAttr().Get(time)), 0.0)
-        tint = [float(v) for v in shaping.GetShapingFocusTintAttr().Get(time)]
-        flat_light = prim.GetTypeName() in ("RectLight", "DiskLight")
+        angle = min(max(self._number(prim, "inputs:shaping:cone:angle"), 0.0), 180.0)
+        softness = min(max(self._number(prim, "inputs:shaping:cone:softness"), 0.0), 1.0)
+        focus = max(self._number(prim, "inputs:shaping:focus"), 0.0)
+        tint = [float(v) for v in self._get(prim, "inputs:shaping:focusTint")]
+        if not np.isfinite(tint).all():
+            raise _UnusableError(f"inputs:shaping:focusTint = {tint}, which is not finite")
+        kind = prim.GetTypeName()
+        flat_light = kind in ("RectLight", "DiskLight")
         if focus == 0 and (angle == 180 or (angle >= 90 and flat_light and softness == 0)):
+            return {}
+        if kind in _INFINITE:
+            if focus > 0 or angle < 90:
+                self._report.unsupported(prim, f"ShapingAPI on a {kind}", "it is ignored")
             return {}
         return {
             "shaping": {
@@ -337,31 +374,6 @@ class Lights:
                 "focus_tint": tint,
             }
         }
-
-
-def add_default_lights(scene: Scene, camera: np.ndarray, gain: float) -> None:
-    """Lights for a stage that has none: a grey sky, and a soft lamp over the camera's shoulder.
-
-    Args:
-        scene: what they are added to.
-        camera: (4, 4) camera to world.
-        gain: factor on every radiance.
-    """
-    scene.add_light("default sky", {"type": "dome", "radiance": [0.4 * gain] * 3})
-    c, s = math.cos(math.radians(35)), math.sin(math.radians(35))
-    # Both turns take the camera's direction of view, -Z: to the right, then downwards.
-    to_right = np.array([[c, 0, -s, 0], [0, 1, 0, 0], [s, 0, c, 0], [0, 0, 0, 1.0]])
-    down = np.array([[1.0, 0, 0, 0], [0, c, s, 0], [0, -s, c, 0], [0, 0, 0, 1]])
-    lamp = camera @ to_right @ down
-    scene.add_light(
-        "default lamp",
-        {
-            "type": "distant",
-            "angle": math.radians(10),
-            "irradiance": [2 * gain] * 3,
-            "transform": flat(lamp),
-        },
-    )
 
 
 def stage_is_z_up(stage: Usd.Stage) -> bool:

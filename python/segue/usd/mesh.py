@@ -90,7 +90,14 @@ def _plain_normals(
     if normals is None:
         report.warning(mesh.GetPrim(), "normals of a wrong type", "it is drawn flat")
         return None
-    interpolation = primvar.INTERPOLATION[mesh.GetNormalsInterpolation()]
+    interpolation = primvar.INTERPOLATION.get(mesh.GetNormalsInterpolation())
+    if interpolation is None:
+        report.warning(
+            mesh.GetPrim(),
+            f"normals with the unknown interpolation '{mesh.GetNormalsInterpolation()}'",
+            "it is drawn flat",
+        )
+        return None
     wanted = data.elements.of(interpolation)
     if len(normals) != wanted:
         report.warning(

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._abi import INTERPOLATIONS
 from ..scene import Attribute
-from ._pxr import Usd, UsdGeom
+from ._pxr import Sdf, Usd, UsdGeom
 from .report import Report
 
 #: UsdGeom's names of where values sit, as the ABI's.
@@ -75,14 +75,22 @@ def read(
         report.warning(prim, f"the primvar '{name}' is not finite", "it is ignored")
         return None
     width = primvar.GetElementSize()
-    if not primvar.GetTypeName().isArray:
+    # What is authored may be one value where the schema says an array.
+    if not Sdf.GetValueTypeNameForValue(raw).isArray:
         data = data[None]
     if data.ndim == 1:
         data = data[:, None]
     if width > 1:
         report.unsupported(prim, f"the primvar '{name}' has elementSize {width}", "it is ignored")
         return None
-    interpolation = INTERPOLATION[primvar.GetInterpolation()]
+    interpolation = INTERPOLATION.get(primvar.GetInterpolation())
+    if interpolation is None:
+        report.warning(
+            prim,
+            f"the primvar '{name}' has the unknown interpolation '{primvar.GetInterpolation()}'",
+            "it is ignored",
+        )
+        return None
     indices = None
     if primvar.IsIndexed():
         indices = np.asarray(primvar.GetIndices(time), dtype=np.int64)

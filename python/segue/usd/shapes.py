@@ -13,6 +13,7 @@ import numpy as np
 
 from ._pxr import Usd
 from .mesh_data import MeshData
+from .properties import Properties
 
 #: Segments around an axis, and from pole to pole.
 AROUND = 128
@@ -29,11 +30,11 @@ _TO_AXIS = {
 Shape = tuple[tuple, Any, np.ndarray]
 
 
-def shape_of(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
+def shape_of(prim: Usd.Prim, properties: Properties) -> Shape | None:
     """The implicit shape that a prim is, or None if it is none."""
 
     def get(name: str) -> Any:
-        return prim.GetAttribute(name).Get(time)
+        return properties.named(prim, name)
 
     kind = prim.GetTypeName()
     if kind == "Sphere":

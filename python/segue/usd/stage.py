@@ -12,11 +12,15 @@ import numpy as np
 from ..errors import SegueError
 from ..scene import Scene
 from ._pxr import Tf, Usd, UsdGeom
-from .camera import Frame, exposure_scale, find_camera, framing_camera, read_camera, read_settings
+from .camera import CameraError, Frame, exposure_scale, find_camera, framing_camera, read_camera
+from .default_lights import add_default_lights, can_shine
 from .geometry import Geometry, geometry_light_targets
 from .inputs import Inputs
-from .light import Lights, add_default_lights, stage_is_z_up
+from .light import Lights, stage_is_z_up
 from .material import Materials
+from .motion import report_motion
+from .properties import Properties
+from .render_settings import read_settings
 from .report import Report
 from .texture import Textures
 from .walk import Walker, is_light
@@ -80,7 +84,7 @@ def load(
     *,
     frame: float | None = None,
     camera: str | None = None,
-    purposes: Iterable[str] = ("default", "render"),
+    purposes: Iterable[str] | None = None,
     resolution: tuple[int, int] | None = None,
     scene: Scene | None = None,
 ) -> Imported:
@@ -93,7 +97,8 @@ def load(
         path_or_stage: a file, or a stage that is open.
         frame: time code; None: the stage's start, or the earliest values where it names none.
         camera: path or name of a camera prim; None: the render settings' one, else the first.
-        purposes: UsdGeom purposes to draw.
+        purposes: UsdGeom purposes to draw; None: the render settings' ones, else default and
+            render.
         resolution: width and height; None: the render settings' ones, else 1280 pixels wide.
         scene: scene to add to; None: a new one.
 
@@ -105,29 +110,32 @@ def load(
     time = _time(stage, frame)
     report = Report()
     _report_composition(stage, report)
-    purposes = tuple(purposes)
+    properties = Properties(time, report)
     target = Scene() if scene is None else scene
 
-    settings = read_settings(stage, time, report)
-    try:
-        camera_prim = find_camera(stage, camera or "", settings, report)
-    except LookupError as error:
-        raise StageError(error.args[0]) from None
+    settings = read_settings(stage, properties)
+    purposes = settings.purposes if purposes is None else tuple(purposes)
     z_up = stage_is_z_up(stage)
     # Light transport is linear: a camera's exposure is a factor on all that emits.
-    gain = exposure_scale(UsdGeom.Camera(camera_prim), time) if camera_prim else 1.0
-    shot = (
-        read_camera(camera_prim, time, settings, resolution, report)
-        if camera_prim
-        else framing_camera(stage, time, purposes, settings, resolution, z_up)
-    )
+    try:
+        camera_prim = find_camera(stage, camera or "", settings, report)
+        gain = exposure_scale(UsdGeom.Camera(camera_prim), properties) if camera_prim else 1.0
+        shot = (
+            read_camera(camera_prim, properties, settings, resolution)
+            if camera_prim
+            else framing_camera(stage, time, purposes, settings, resolution, z_up)
+        )
+    except CameraError as error:
+        raise StageError(str(error)) from None
     if camera_prim is None:
         report.note("", "the stage has no camera", "one was made that sees all of it")
+    elif settings.has_shutter:
+        report_motion(camera_prim, properties)
     target.set_camera(shot.name, shot.camera)
 
     camera_to_world = np.reshape(shot.camera["transform"], (4, 4))
     with np.errstate(all="ignore"):  # what is not finite is looked for where it matters
-        counts = _fill(target, stage, time, purposes, report, gain, z_up, camera_to_world)
+        counts = _fill(target, stage, properties, purposes, gain, z_up, camera_to_world)
     value = None if time.IsDefault() or time.IsEarliestTime() else time.GetValue()
     return Imported(target, shot.name, shot.resolution, shot.crop, value, report, counts)
 
@@ -135,19 +143,19 @@ def load(
 def _fill(
     scene: Scene,
     stage: Usd.Stage,
-    time: Usd.TimeCode,
+    properties: Properties,
     purposes: tuple[str, ...],
-    report: Report,
     gain: float,
     z_up: bool,
     camera: np.ndarray,
 ) -> dict[str, int]:
     """Adds the stage's lights and geometry; returns how many of what."""
+    time, report = properties.time, properties.report
     inputs = Inputs(time, report)
     textures = Textures(scene, inputs)
     materials = Materials(scene, textures, inputs)
-    lights = Lights(scene, textures, time, report, gain, z_up)
-    geometry = Geometry(scene, materials, lights, time, report, gain)
+    lights = Lights(scene, textures, properties, gain, z_up)
+    geometry = Geometry(scene, materials, lights, properties, gain)
     items = Walker(stage, time, purposes, report).items()
     geometry.geometry_lights = geometry_light_targets([i.prim for i in items])
     for item in items:
@@ -157,7 +165,7 @@ def _fill(
             lights.add(item.prim, item.transforms)
         else:
             geometry.add(item)
-    if not lights.count and not geometry.emitters:
+    if not lights.count and not geometry.emitters and not can_shine(stage):
         report.note("", "the stage has no light", "a grey sky and a lamp by the camera were added")
         add_default_lights(scene, camera, gain)
     return {"gprims": len(items), "lights": lights.count, "emissive gprims": geometry.emitters}

@@ -121,7 +121,7 @@ class Textures:
     def light_image(self, attribute: Usd.Attribute) -> int | None:
         """The image of a light's texture, or None, with a warning, if it cannot be read."""
         asset = attribute.Get(self._time) if attribute else None
-        if not asset or not asset.path:
+        if not isinstance(asset, Sdf.AssetPath) or not asset.path:
             return None
         loaded = self._load(attribute, asset, "auto")
         if isinstance(loaded, str):
@@ -190,6 +190,7 @@ class Textures:
         """Follows `st` through UsdTransform2d nodes to the primvar."""
         matrix = np.eye(3)
         name, node = "st", shader
+        passed = {shader.GetPath()}
         while True:
             found = self._inputs.source(node, name)
             if not is_node(found):
@@ -208,6 +209,14 @@ class Textures:
                     )
                 return Coordinates("st", matrix)
             node = found[0]
+            if node.GetPath() in passed:
+                self._report.warning(
+                    node.GetPrim(),
+                    "texture coordinates that depend on themselves",
+                    "the primvar 'st' is used",
+                )
+                return Coordinates("st", np.eye(3))
+            passed.add(node.GetPath())
             kind = node.GetIdAttr().Get()
             if kind == "UsdTransform2d":
                 matrix = matrix @ self._transform_2d(node)
@@ -279,16 +288,14 @@ class Textures:
 def _colorspace(picture: images.Picture, space: str) -> str:
     """UsdUVTexture's `sourceColorSpace` as the ABI's colour space.
 
-    "auto": what the file says of itself; else sRGB for 8 bits with 3 or 4 channels, else raw.
+    "auto": sRGB for 8 bits with 3 or 4 channels, else raw. The file's own word is not asked for:
+    OpenImageIO calls every PNG and JPEG sRGB, whether the file says so or not.
     """
     if space == "sRGB":
         return "srgb"
     if space == "raw":
         return "raw"
-    channels = picture.pixels.shape[2]
-    if picture.is_8_bit:
-        return "srgb" if channels >= 3 or "srgb" in picture.colorspace.lower() else "raw"
-    return "raw"
+    return "srgb" if picture.is_8_bit and picture.pixels.shape[2] >= 3 else "raw"
 
 
 def _thresholded(

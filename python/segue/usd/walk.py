@@ -7,7 +7,7 @@ deeply they are nested.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -224,6 +224,13 @@ class Walker:
 def _is_drawable(prim: Usd.Prim) -> bool:
     """Whether the prim itself is geometry or a light, rather than a group, camera or material."""
     return prim.IsA(UsdGeom.Boundable) or prim.HasAPI(UsdLux.LightAPI) or is_light(prim)
+
+
+def all_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
+    """All prims, hidden ones too, those of each prototype once."""
+    yield from stage.Traverse()
+    for prototype in stage.GetPrototypes():
+        yield from Usd.PrimRange(prototype)
 
 
 def is_light(prim: Usd.Prim) -> bool:
