@@ -56,13 +56,22 @@ impl World {
         let mut weight = Vec3::ONE;
         while let Some(hit) = self.accel.closest_where(&ray, &counts) {
             let p = SurfacePoint::new(&self.scene, &self.accel, &hit);
+            let rest = ray_from(&p.place);
+            // a plane that both ends lie on, to rounding, is met without end
+            if rest.t_max.is_finite() && length_squared(&rest) >= length_squared(&ray) {
+                return weight;
+            }
             weight *= self.materials.transparency(p.material, &p.at);
             if weight == Vec3::ZERO {
                 return weight;
             }
             *rays += 1;
-            ray = ray_from(&p.place);
+            ray = rest;
         }
         weight
     }
+}
+
+fn length_squared(ray: &Ray) -> f32 {
+    (ray.direction * ray.t_max).length_squared()
 }

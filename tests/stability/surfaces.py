@@ -100,6 +100,22 @@ def rounded(full: bool) -> Rows:
         yield beside(method, reference, s.means(*size, integrator=method), 0.02)
 
 
+@case(GROUP, "path tracing")
+def beside_itself(full: bool) -> Rows:
+    """A tilted lamp that scatters and lets light pass: it lies in the way to itself."""
+    s = Stage()
+    lamp = {"type": "principled", "emission_color": [1, 1, 1], "emission_strength": 1.0}
+    transparent = {"type": "transparent"}
+    x, y = np.array([0.6, 0.55, 0.58]), np.array([-0.7, 0.63, 0.14])
+    points = [-x - y, x - y, x + y, y - x]
+    mixed = {"type": "mix", "factor": 0.4, "a": transparent, "b": lamp}
+    s.mesh(points, [0, 1, 2, 0, 2, 3], mixed)
+    s.light("dome", radiance=[0.5, 0.5, 0.5])
+    s.camera([0, -0.8, 2.8], [0, 0, 0], 0.5)
+    reference = s.means(32, 256, 6, integrator="path")
+    yield beside("segment", reference, s.means(32, 32, 6), 0.02)
+
+
 @case(GROUP, "the floor without them: albedo under a white sky")
 def triangles(full: bool) -> Rows:
     """Degenerate, duplicated, needle-thin and coplanar triangles, and one that fills the view."""
