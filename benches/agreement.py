@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from itertools import combinations, product
+from itertools import combinations
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -24,10 +24,10 @@ from segue import Render, Scene, usd
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers" / "usd"
 KEPT = ROOT / "results" / "agreement"
-SECONDS = float(os.environ.get("SEGUE_SECONDS", "3"))
+SECONDS = float(os.environ.get("SEGUE_SECONDS", "0.85"))
 SEEDS, BLOCK = 6, 8
 #: Pictures of the gallery, and of the shared scenes, which are square.
-WIDE, SQUARE = (288, 162), (192, 192)
+WIDE, SQUARE = (96, 54), (64, 64)
 UNBIASED = ("path", "light", "bdpt")
 BIASED = (
     *("segment", "mvf", "photon-filter", "segment-bridge", "segment-path"),
@@ -62,7 +62,8 @@ reflection, which is as noisy for all methods, and light tracing is complete.
 **Standard errors** are the largest of three: by the scatter of the {SEEDS} seeds' means; by that of the pixels as if these were independent, times how much more seeds scatter than this lets expect, on
 average over the scenes for the same method and kernel; and {CHUNKS:g} times the most that one pixel of one seed brings to the mean. The second is there since the first, from so few seeds, is
 often much too small by accident. The third, since scatter knows only of light that came: where a mean is made of few bright events, some as bright may well not have happened yet, and what has met
-but a few of them must not pass for precise. What comes with one kernel counts with the other as well; `{GATHERS}` has nothing but photons, which are as much brighter as the kernel is smaller. What has met none cannot be told from its own pictures, and may be said to differ where it only had bad luck.
+but a few of them must not pass for precise. `{GATHERS}` has nothing but photons, and small kernels meet few: what one brings at {KERNELS[0]:.2f} pixels counts at {KERNELS[-1]:g} as well, as much brighter as
+the kernel is smaller. What has met none cannot be told from its own pictures, and may be said to differ where it only had bad luck.
 
 **Verdicts.** *agrees*: within {LIMIT:.1%} or two standard errors, which are at most {LIMIT:.1%}. *differs*: beyond {LIMIT:.1%} and beyond as many standard errors as one table in a hundred
 reaches by accident. *{CANNOT}*: the same, too dark, and the method does not make all paths: `light` sees nothing rough in mirrors or behind smooth glass; `path` and `mvf` do not meet
@@ -279,13 +280,12 @@ def lend(places: list[Place]) -> None:
         excess = max(float(np.mean([row.excess() for row in alike])), 1.0)
         for row in alike:
             row.variance = (excess * np.array(row.variance)).tolist()
+    wide, narrow = (ROWS.index((GATHERS, kernel)) for kernel in KERNELS)
     brighter = (KERNELS[0] / KERNELS[-1]) ** 2
-    for place, method in product(places, BIASED):
-        large, small = (place.rows[ROWS.index((method, k))] for k in KERNELS)
-        factor = brighter if method == GATHERS else 1.0
-        pairs = zip(large.chunk, small.chunk, strict=True)
-        most = [max(one, other / factor) for one, other in pairs]
-        large.chunk, small.chunk = most, [factor * chunk for chunk in most]
+    for place in places:
+        small, large = place.rows[narrow], place.rows[wide]
+        chunks = zip(small.chunk, large.chunk, strict=True)
+        small.chunk = [max(own, brighter * other) for own, other in chunks]
 
 
 def threshold(tests: int) -> float:
