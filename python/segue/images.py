@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from .errors import OutputError
+
 
 class ImageError(Exception):
     """A picture could not be read; the text says why."""
@@ -165,7 +167,7 @@ def write_exr(
     The file takes its place when it is complete.
 
     Raises:
-        ImageError: it cannot be written.
+        OutputError: it cannot be written.
     """
     oiio = _oiio()
     height, width, _ = next(iter(layers.values())).shape
@@ -176,29 +178,33 @@ def write_exr(
         spec[name] = value
     pixels = np.concatenate([np.asarray(p, np.float32) for p in layers.values()], axis=2)
     unfinished = path.with_name(f".{path.stem}.unfinished.exr")
-    file = oiio.ImageOutput.create(str(unfinished))
-    if file is None or not file.open(str(unfinished), spec):
-        raise ImageError(f"{path} cannot be written: {oiio.geterror()}")
-    written = file.write_image(np.ascontiguousarray(pixels))
-    if not (file.close() and written):
+    try:
+        _write(oiio, unfinished, spec, pixels, path)
+        unfinished.replace(path)
+    except OSError:
         unfinished.unlink(missing_ok=True)
-        raise ImageError(f"{path} cannot be written: {file.geterror()}")
-    unfinished.replace(path)
+        raise
 
 
 def write_png(path: Path, pixels: np.ndarray) -> None:
     """Writes (h, w, 3) uint8 sRGB pixels.
 
     Raises:
-        ImageError: the file cannot be written.
+        OutputError: the file cannot be written.
     """
     oiio = _oiio()
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, "uint8")
     spec["oiio:ColorSpace"] = "sRGB"
+    _write(oiio, path, spec, pixels, path)
+
+
+def _write(oiio: Any, path: Path, spec: Any, pixels: np.ndarray, name: Path) -> None:
+    """Writes a picture; failures are told of the file called `name`."""
     file = oiio.ImageOutput.create(str(path))
-    if file is None or not file.open(str(path), spec):
-        raise ImageError(f"{path} cannot be written: {oiio.geterror()}")
-    written = file.write_image(np.ascontiguousarray(pixels))
+    if file is None:
+        raise OutputError(f"{name} cannot be written: {oiio.geterror()}")
+    written = file.open(str(path), spec) and file.write_image(np.ascontiguousarray(pixels))
     if not (file.close() and written):
-        raise ImageError(f"{path} cannot be written: {file.geterror()}")
+        reason = file.geterror() or "the folder or the disk does not take it"
+        raise OutputError(f"{name} cannot be written: {reason}")

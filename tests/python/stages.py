@@ -48,3 +48,19 @@ QUAD = """
     point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
     uniform token subdivisionScheme = "none"
 """
+
+#: A light alone, and a lens.
+LIGHT = 'def DomeLight "Sky" { }\n'
+LENS = "float focalLength = 50\nfloat horizontalAperture = 40\nfloat verticalAperture = 20\n"
+
+
+def camera(attributes: str, more: str = "", header: str = 'upAxis = "Y"', **options):
+    """The description of a camera with these attributes, and the import."""
+    body = f'def Camera "Camera" {{\n{attributes}\n}}\n{more}\n{LIGHT}'
+    scene, imported = load(body, header, plain=True, **options)
+    return scene.camera, imported
+
+
+def settings(text: str) -> str:
+    """Render settings with these attributes."""
+    return f'def Scope "Render" {{\ndef RenderSettings "Settings" {{\n{text}\n}}\n}}'

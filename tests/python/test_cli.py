@@ -222,6 +222,31 @@ def test_failures_are_one_line(stage, tmp_path, arguments, status, words):
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize("name", ["folder.exr", "folder.png", "/proc/x.exr", "/proc/x.png"])
+def test_outputs_that_cannot_be_written_are_found_first(stage, tmp_path, name):
+    (tmp_path / "folder.exr").mkdir()
+    (tmp_path / "folder.png").mkdir()
+    began = time.monotonic()
+    _, err = run("render", stage, "-o", tmp_path / name, "--time", 60, status=1)
+    assert time.monotonic() - began < 30
+    assert err.splitlines()[0].startswith("segue: ")
+    reason = "it is a folder" if "folder" in name else "No such file or directory"
+    assert err.endswith(f" cannot be written: {reason}\n")
+
+
+def test_statistics_that_cannot_be_written_are_found_first(stage, tmp_path):
+    _, err = run("render", stage, "-o", tmp_path / "a.exr", "--stats", tmp_path, status=1)
+    assert err == f"segue: {tmp_path} cannot be written: it is a folder\n"
+    assert list(tmp_path.glob("*.exr")) == []
+
+
+def test_a_picture_that_cannot_be_written_says_why(tmp_path):
+    with pytest.raises(segue.OutputError, match=r"gone/a.png cannot be written: \w+"):
+        images.write_png(tmp_path / "gone" / "a.png", np.zeros((2, 2, 3), np.uint8))
+    with pytest.raises(segue.OutputError, match=r"gone/a.exr cannot be written: \w+"):
+        images.write_exr(tmp_path / "gone" / "a.exr", {"Combined": np.zeros((2, 2, 3))}, {})
+
+
 def test_a_reference_of_another_size(stage, tmp_path):
     run("render", stage, "-o", tmp_path / "r.exr", "--samples", 1, "--resolution", "8x8", "--quiet")
     _, err = run("render", stage, "-o", tmp_path / "a.exr", "--samples", 1, "--reference",

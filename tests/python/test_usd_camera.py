@@ -10,22 +10,7 @@ import pytest
 pytest.importorskip("pxr")
 
 from segue import usd
-from stages import load, reported
-
-LIGHT = 'def DomeLight "Sky" { }\n'
-
-
-def camera(attributes: str, more: str = "", header: str = 'upAxis = "Y"', **options):
-    body = f'def Camera "Camera" {{\n{attributes}\n}}\n{more}\n{LIGHT}'
-    scene, imported = load(body, header, plain=True, **options)
-    return scene.camera, imported
-
-
-def settings(text: str) -> str:
-    return f'def Scope "Render" {{\ndef RenderSettings "Settings" {{\n{text}\n}}\n}}'
-
-
-LENS = "float focalLength = 50\nfloat horizontalAperture = 40\nfloat verticalAperture = 20\n"
+from stages import LENS, LIGHT, QUAD, camera, load, reported, settings
 
 
 def test_window_and_default_size():
@@ -33,7 +18,7 @@ def test_window_and_default_size():
     assert found["type"] == "perspective"
     assert found["window"] == pytest.approx([-0.4, 0.4, -0.2, 0.2])
     assert imported.resolution == (1280, 640)
-    assert found["near"] == 1
+    assert found["near"] == 0
     assert "far" not in found
     assert "aperture_radius" not in found
 
@@ -72,6 +57,21 @@ def test_clipping_range():
     found, _ = camera(LENS + "float2 clippingRange = (0.5, inf)")
     assert found["near"] == 0.5
     assert "far" not in found
+
+
+def test_a_clipping_range_that_is_no_range():
+    found, imported = camera(LENS + "float2 clippingRange = (nan, 40)")
+    assert found["near"] == 0
+    assert [p for p, _ in reported(imported, usd.Kind.WARNING)] == ["/Camera"]
+
+
+@pytest.mark.parametrize("scale", ["(1, 0, 1)", "(nan, 1, 1)", "(1, 1, inf)"])
+def test_a_camera_without_a_place_is_an_error_that_names_it(scale):
+    with pytest.raises(usd.StageError, match=r"the camera /Camera is singular or not finite"):
+        camera(
+            LENS + f"double3 xformOp:scale = {scale}\n"
+            'uniform token[] xformOpOrder = ["xformOp:scale"]'
+        )
 
 
 def test_transformation_without_scale():
@@ -208,6 +208,26 @@ def test_a_stage_without_camera_is_seen_whole(up):
     assert y.max() - y.min() > 0.3 * (y1 - y0)
     assert matrix[2 if up == "Z" else 1, 1] > 0.9  # the picture's up is the stage's
     assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("extent", ["(0, 0, 0), (0, 0, 0)", "(-900, -900, -900), (900, 900, 900)"])
+def test_authored_extents_do_not_move_the_framing_camera(extent):
+    quad = f'def Mesh "M" {{\n{QUAD}\n%s\n}}\n{LIGHT}'
+    right, _ = load(quad % "", plain=True)
+    scene, _ = load(quad % f"float3[] extent = [{extent}]", plain=True)
+    assert scene.camera == right.camera
+    place = np.reshape(scene.camera["transform"], (4, 4))[:3, 3]
+    assert np.linalg.norm(place - [0.5, 0.5, 0]) == pytest.approx(
+        math.sqrt(0.5) / math.sin(math.atan(0.5625 * 18 / 35))
+    )
+
+
+def test_lights_are_seen_by_the_framing_camera():
+    one = 'def SphereLight "L" {\nfloat inputs:radius = 3\n}\n'
+    scene, _ = load(one, plain=True)
+    place = np.reshape(scene.camera["transform"], (4, 4))[:3, 3]
+    distance = 3 * math.sqrt(3) / math.sin(math.atan(0.5625 * 18 / 35))
+    assert np.linalg.norm(place) == pytest.approx(distance)
 
 
 def test_camera_at_a_frame():

@@ -132,6 +132,9 @@ def RenderSettings "Settings"
 }
 """
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
+PROPERTY = re.compile(
+    r"(?P<uniform>uniform )?(?P<kind>\w+(\[\])?) (?P<name>[\w:]+) = [^\n]*(?<!\()$", re.MULTILINE
+)
 VALUES = ("0", "-1", "nan", "inf", "1e38", "-1e38", "1e-42", "7", "99999", "0.5")
 
 
@@ -152,9 +155,32 @@ def damaged(text: str, chance: random.Random) -> str:
     return text
 
 
+def mistyped(text: str, chance: random.Random) -> str:
+    """The text with a few properties of another type, blocked, or with words nobody knows."""
+    for _ in range(chance.randint(1, 4)):
+        found = chance.choice(list(PROPERTY.finditer(text)))
+        uniform, kind, name = (found[n] or "" for n in ("uniform", "kind", "name"))
+        new = chance.choice(
+            (
+                f'{uniform}string {name} = "q"',
+                f'{uniform}token {name} = ""',
+                f'{uniform}token[] {name} = ["q"]',
+                f"{uniform}float3 {name} = (1, nan, 3)",
+                f"{uniform}float[] {name} = [1, 2, 3, 4, 5]",
+                f"{uniform}int {name} = -7",
+                f"{uniform}bool {name} = 1",
+                f"{uniform}asset {name} = @q@",
+                f"{kind} {name}.timeSamples = {{0: None}}",
+            )
+        )
+        text = text[: found.start()] + new + text[found.end() :]
+    return text
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("real", [False, True])
-def test_damaged_stages(seed, real, request):
+@pytest.mark.parametrize("damaged", [damaged, mistyped])
+def test_damaged_stages(seed, real, damaged, request):
     if real:
         request.getfixturevalue("engine")
     chance = random.Random(seed)

@@ -279,7 +279,7 @@ def test_lights_that_do_not_shine_are_said(body, kind):
 @pytest.mark.parametrize(
     "body",
     [
-        "def DistantLight \"L\" {\nfloat inputs:intensity.timeSamples = {1: 0, 2: 3}\n}\n",
+        'def DistantLight "L" {\nfloat inputs:intensity.timeSamples = {1: 0, 2: 3}\n}\n',
         'def SphereLight "L" {\ntoken visibility = "invisible"\n}\n',
         'def SphereLight "L" {\nfloat inputs:intensity = -1\n}\n',
         'def PortalLight "L" { }\n',

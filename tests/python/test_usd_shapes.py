@@ -94,6 +94,20 @@ def test_extent_is_the_one_usd_computes(kind, attributes, axis):
     np.testing.assert_allclose(corners.max(axis=(0, 1)), expected[1], atol=1e-5)
 
 
+def test_a_cubes_primvars_are_in_openusds_order():
+    scene, _ = load(
+        'def Cube "C" {\n'
+        "color3f[] primvars:displayColor = [(0, 0, 1), (0, 0, -1), (0, 1, 0), (0, -1, 0), "
+        '(1, 0, 0), (-1, 0, 0)] (\ninterpolation = "uniform"\n)\n}\n'
+    )
+    corners, _ = triangles(scene)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    (mesh,) = scene.meshes
+    np.testing.assert_array_equal(cross[::2] / 4, mesh.attributes["displayColor"].data)
+    # Vertices: from +X +Y around the top, then from -X -Y around the bottom.
+    assert mesh.points[[0, 2, 4, 6]].tolist() == [[1, 1, 1], [-1, -1, 1], [-1, -1, -1], [1, 1, -1]]
+
+
 def test_the_tip_of_a_cone_is_on_its_axis():
     scene, _ = load('def Cone "S" {\nuniform token axis = "X"\ndouble height = 4\n}')
     corners, _ = triangles(scene)

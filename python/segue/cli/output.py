@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from pathlib import Path
 
 from .. import images
+from ..errors import OutputError
 from ..render import Render
 from ..tonemapping import neutral, to_srgb
 from .status import UsageError
@@ -27,23 +29,46 @@ def frame_path(path: Path, frame: float | None, many: bool) -> Path:
     )
 
 
+def files(path: Path) -> list[Path]:
+    """What is written for a picture of that name: the EXR, and the PNG if that was asked for."""
+    return [path.with_suffix(".exr"), path] if path.suffix.lower() == ".png" else [path]
+
+
 def check_path(path: Path) -> None:
     """Refuses what cannot be written, before anything is rendered.
 
     Raises:
         UsageError: the suffix is unknown, or the folder does not exist.
+        OutputError: the file is a folder, or its folder takes no files.
     """
     if path.suffix.lower() not in (".exr", ".png"):
         raise UsageError(f"{path}: the output has to be an .exr or a .png")
     if not path.parent.is_dir():
         raise UsageError(f"{path}: the folder {path.parent} does not exist")
+    for file in files(path):
+        check_file(file)
+
+
+def check_file(path: Path) -> None:
+    """Refuses a file that cannot be written.
+
+    Raises:
+        OutputError: it is a folder, or its folder takes no files.
+    """
+    if path.is_dir():
+        raise OutputError(f"{path} cannot be written: it is a folder")
+    try:
+        # Permissions do not tell: what holds for a user need not hold for a file system.
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".segue-"):
+            pass
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def write(render: Render, path: Path, attributes: dict[str, str]) -> list[Path]:
     """Writes the EXR, and the PNG if that was asked for. Returns what was written."""
-    exr = path.with_suffix(".exr") if path.suffix.lower() == ".png" else path
-    render.write_exr(exr, attributes=attributes)
-    if exr == path:
-        return [exr]
-    images.write_png(path, to_srgb(neutral(render.read_pass("Combined")[:, :, :3])))
-    return [exr, path]
+    written = files(path)
+    render.write_exr(written[0], attributes=attributes)
+    for png in written[1:]:
+        images.write_png(png, to_srgb(neutral(render.read_pass("Combined")[:, :, :3])))
+    return written

@@ -111,14 +111,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(options: argparse.Namespace) -> Status:
     """Renders one frame or several."""
-    output.check_path(options.output)
-    if options.stats is not None and not options.stats.parent.is_dir():
-        raise UsageError(f"{options.stats}: the folder {options.stats.parent} does not exist")
+    if options.stats is not None:
+        if not options.stats.parent.is_dir():
+            raise UsageError(f"{options.stats}: the folder {options.stats.parent} does not exist")
+        output.check_file(options.stats)
     reference = images.read_rgb(options.reference) if options.reference else None
     frames = [options.frame]
     if options.frames is not None:
         first, last = options.frames
         frames = [float(f) for f in range(first, last + 1)]
+    for frame in frames:
+        output.check_path(output.frame_path(options.output, frame, len(frames) > 1))
     collected = []
     with Cancellation() as cancellation:
         for frame in frames:

@@ -252,7 +252,7 @@ def write(path: Path, result: Result, attributes: Mapping[str, str | float]) -> 
     """Writes layers `Combined` and `Variance` (of the mean), and the error in the header.
 
     Raises:
-        ImageError: the file cannot be written.
+        OutputError: the file cannot be written.
     """
     found = result.estimate
     assert found is not None, "there is something to write"

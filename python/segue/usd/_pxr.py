@@ -10,4 +10,10 @@ except ImportError as error:
         f"({error})"
     ) from error
 
-__all__ = ["Ar", "Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdLux", "UsdRender", "UsdShade"]
+
+def reason(error: Tf.ErrorException) -> str:
+    """What USD says of a failure, in one line."""
+    return " ".join(str(error.args[0].commentary if error.args else error).split())
+
+
+__all__ = ["Ar", "Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdLux", "UsdRender", "UsdShade", "reason"]

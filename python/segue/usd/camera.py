@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ._pxr import Gf, Sdf, Usd, UsdGeom
+from ._pxr import Sdf, Usd, UsdGeom
+from .bounds import Bounds
 from .properties import Properties
 from .render_settings import Settings
 from .report import Report
-from .transform import column_matrix, flat, is_usable, without_scale
+from .transform import column_matrix, flat, is_usable, without_scale, world_matrix
 
 #: UsdGeomCamera's apertures and focal length are in tenths of a scene unit.
 TENTH = 0.1
@@ -146,7 +147,7 @@ def read_camera(
         CameraError: it stands nowhere.
     """
     camera, get, report = UsdGeom.Camera(prim), properties.get, properties.report
-    world = column_matrix(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(properties.time))
+    world = column_matrix(world_matrix(prim, properties.time, report))
     if not is_usable(world[None])[0]:
         raise CameraError(
             f"the transformation of the camera {prim.GetPath()} is singular or not finite"
@@ -243,18 +244,14 @@ def _crop(size: tuple[int, int], settings: Settings) -> tuple[int, int, int, int
 
 
 def framing_camera(
-    stage: Usd.Stage,
-    time: Usd.TimeCode,
-    purposes: tuple[str, ...],
+    bounds: Bounds,
     settings: Settings,
     resolution: tuple[int, int] | None,
     z_up: bool,
 ) -> Frame:
-    """A camera that sees the whole stage, for stages without one: a 35 mm lens."""
-    cache = UsdGeom.BBoxCache(time, list(purposes))
-    box: Gf.Range3d = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
-    low, high = np.array(box.GetMin()), np.array(box.GetMax())
-    if box.IsEmpty() or not np.isfinite([low, high]).all():
+    """A camera that sees all that was imported, for stages without one: a 35 mm lens."""
+    low, high = bounds.low, bounds.high
+    if not np.isfinite([low, high]).all():
         low, high = -np.ones(3), np.ones(3)
     center, radius = 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-3)
     half = 18.0 / 35.0

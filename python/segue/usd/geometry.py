@@ -11,6 +11,7 @@ from ..errors import BadSceneError
 from ..scene import Scene
 from . import primvar
 from ._pxr import Sdf, Usd, UsdGeom, UsdLux
+from .bounds import Bounds
 from .light import Lights, is_normalized
 from .material import GREY, Materials, Surface, with_emission
 from .mesh import add_attributes, read_mesh
@@ -45,6 +46,7 @@ class Geometry:
         lights: Lights,
         properties: Properties,
         gain: float,
+        bounds: Bounds,
     ) -> None:
         self._scene = scene
         self._materials = materials
@@ -53,6 +55,7 @@ class Geometry:
         self._time = properties.time
         self._report = properties.report
         self._gain = gain
+        self._bounds = bounds
         self._meshes: dict[Any, int | None] = {}
         self._data: dict[Any, MeshData | None] = {}
         self._count = 0
@@ -110,6 +113,9 @@ class Geometry:
         if number is None:
             return
         self._count += 1
+        used = data.points[data.face_indices].astype(np.float64)
+        if len(used):
+            self._bounds.add(used.min(axis=0), used.max(axis=0), transforms)
         two_sided = bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get(self._time))
         for group, strength in self._emission(light, level, data, transforms):
             ids = [self._material(s, light, strength) for s in surfaces]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._pxr import Sdf, Tf, Usd, UsdGeom
+from .mesh_data import numbers
 from .report import Report
 
 
@@ -22,7 +23,10 @@ def instance_transforms(
     """
     prim = instancer.GetPrim()
     targets = instancer.GetPrototypesRel().GetForwardedTargets()
-    indices = np.array(instancer.GetProtoIndicesAttr().Get(time) or (), dtype=np.int64)
+    indices = numbers(instancer.GetProtoIndicesAttr(), time)
+    if indices is None:
+        report.warning(prim, "a PointInstancer whose protoIndices are no integers", "left out")
+        return []
     if not len(indices):
         report.left_out(prim, "a PointInstancer without instances")
         return []
@@ -45,7 +49,8 @@ def instance_transforms(
         )
         return []
     for found in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues():
-        if found.GetInterpolation() in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying):
+        # Only what is constant says the same of every instance, and is inherited.
+        if found.GetInterpolation() != UsdGeom.Tokens.constant:
             name = found.GetPrimvarName()
             report.unsupported(prim, f"values of '{name}' for each instance", "they are ignored")
     rows = np.array(matrices, dtype=np.float64).reshape(-1, 4, 4)

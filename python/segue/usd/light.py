@@ -14,6 +14,8 @@ import numpy as np
 from ..errors import BadArgumentError, BadSceneError
 from ..scene import Scene
 from ._pxr import Sdf, Tf, Usd, UsdGeom, UsdLux
+from .areas import cylinder_area, disk_area, rect_area, sphere_area
+from .bounds import Bounds
 from .color_space import check_color_space
 from .properties import Properties
 from .texture import Textures
@@ -25,8 +27,8 @@ _POLE_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]
 #: Lights infinitely far away, which have no shape.
 _INFINITE = ("DistantLight", "DomeLight", "DomeLight_1")
 
-#: Gauss-Legendre points along, and points around, for areas of stretched shapes.
-_ALONG, _AROUND = 64, 256
+#: Surfaces from here on do not fit the engine's single precision.
+LARGEST_AREA = 1e34
 
 
 class _UnusableError(Exception):
@@ -50,50 +52,22 @@ def is_normalized(light: UsdLux.LightAPI, properties: Properties) -> bool:
     return bool(properties.get(light.GetNormalizeAttr()))
 
 
-def rect_area(width: float, height: float, matrix: np.ndarray) -> float:
-    """World-space area of a rectangle in the local XY plane."""
-    return float(np.linalg.norm(np.cross(matrix[:3, 0] * width, matrix[:3, 1] * height)))
-
-
-def disk_area(radius: float, matrix: np.ndarray) -> float:
-    """World-space area of a disk in the local XY plane; stretched, it is an ellipse."""
-    return math.pi * radius**2 * rect_area(1.0, 1.0, matrix)
-
-
-def sphere_area(radius: float, matrix: np.ndarray) -> float:
-    """World-space area of a sphere; stretched, it is an ellipsoid.
-
-    A patch dA with normal n becomes |det M| |M^-T n| dA (Nanson), integrated over the sphere.
-    """
-    nodes, weights = np.polynomial.legendre.leggauss(_ALONG)
-    angles = np.arange(_AROUND) * (2 * math.pi / _AROUND)
-    ring = np.sqrt(1 - nodes**2)
-    normals = np.stack(
-        [
-            ring[:, None] * np.cos(angles),
-            ring[:, None] * np.sin(angles),
-            np.broadcast_to(nodes[:, None], (_ALONG, _AROUND)),
-        ],
-        axis=-1,
+def _half_size(light: dict[str, Any]) -> np.ndarray:
+    """Half the extent of a light's description along each local axis."""
+    radius = light.get("radius", 0.0)
+    return np.array(
+        {
+            "rect": (0.5 * light.get("width", 0.0), 0.5 * light.get("height", 0.0), 0.0),
+            "disk": (radius, radius, 0.0),
+            "cylinder": (0.5 * light.get("length", 0.0), radius, radius),
+        }.get(light["type"], (radius,) * 3)
     )
-    linear = matrix[:3, :3]
-    stretch = np.linalg.norm(normals @ _cofactor(linear).T, axis=-1).mean(axis=1)
-    return float(2 * math.pi * radius**2 * (weights * stretch).sum())
 
 
-def cylinder_area(radius: float, length: float, matrix: np.ndarray) -> float:
-    """World-space area of a cylinder around local X, without its caps."""
-    angles = np.arange(_AROUND) * (2 * math.pi / _AROUND)
-    tangents = np.stack([np.zeros(_AROUND), -np.sin(angles), np.cos(angles)], axis=-1)
-    linear = matrix[:3, :3]
-    patches = np.cross(linear[:, 0], tangents @ linear.T)
-    return float(2 * math.pi * radius * length * np.linalg.norm(patches, axis=1).mean())
-
-
-def _cofactor(linear: np.ndarray) -> np.ndarray:
-    """The matrix that turns area vectors: its columns are the cross products of the others."""
-    x, y, z = linear.T
-    return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
+def _checked_area(area: float) -> float:
+    if not area < LARGEST_AREA:
+        raise _UnusableError(f"an area of {area:g}, too large to compute with")
+    return area
 
 
 class Lights:
@@ -111,6 +85,7 @@ class Lights:
         properties: Properties,
         gain: float,
         z_up: bool,
+        bounds: Bounds,
     ) -> None:
         self._scene = scene
         self._textures = textures
@@ -118,6 +93,7 @@ class Lights:
         self._report = properties.report
         self._gain = gain
         self._z_up = z_up
+        self._bounds = bounds
         self.count = 0
 
     def add(self, prim: Usd.Prim, transforms: np.ndarray) -> None:
@@ -149,6 +125,9 @@ class Lights:
             if usable is not None and not usable[number]:
                 self._report.left_out(prim, "a light without volume")
                 continue
+            if not np.isfinite(matrix.astype(np.float32)).all():
+                self._report.warning(prim, "a place beyond single precision", "left out")
+                continue
             name = str(prim.GetPath()) + (f"[{number}]" if len(transforms) > 1 else "")
             try:
                 shape = self._shape_keys(prim)
@@ -160,6 +139,9 @@ class Lights:
                 self._report.warning(prim, str(error), "left out")
                 continue
             self.count += 1
+            if kind not in _INFINITE:
+                half = _half_size(description)
+                self._bounds.add(-half, half, matrix[None])
 
     def level(self, prim: Usd.Prim, light: UsdLux.LightAPI) -> np.ndarray | None:
         """A light's radiance with the exposure, or None, with a warning, if it is none."""
@@ -231,7 +213,7 @@ class Lights:
     ) -> dict[str, Any] | None:
         width = self._length(prim, "inputs:width")
         height = self._length(prim, "inputs:height")
-        area = rect_area(width, height, matrix)
+        area = _checked_area(rect_area(width, height, matrix))
         if not area > 0:
             self._no_area(prim)
             return None
@@ -251,7 +233,7 @@ class Lights:
         self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
     ) -> dict[str, Any] | None:
         radius = self._length(prim, "inputs:radius")
-        area = disk_area(radius, matrix)
+        area = _checked_area(disk_area(radius, matrix))
         if not area > 0:
             self._no_area(prim)
             return None
@@ -266,7 +248,7 @@ class Lights:
         self, prim: Usd.Prim, light: UsdLux.LightAPI, level: np.ndarray, matrix: np.ndarray
     ) -> dict[str, Any] | None:
         radius = self._length(prim, "inputs:radius")
-        area = sphere_area(radius, matrix)
+        area = _checked_area(sphere_area(radius, matrix))
         normalized = is_normalized(light, self._properties)
         if self._get(prim, "treatAsPoint") or not area > 0:
             # A convex body of radiance L and area A has L A / 4 of intensity on average over the
@@ -291,7 +273,7 @@ class Lights:
         if not radius > 0 and length > 0 and is_normalized(light, self._properties):
             radius = length * 1e-3
             self._report.unsupported(prim, "a line light", f"a cylinder of radius {radius:g}")
-        area = cylinder_area(radius, length, matrix)
+        area = _checked_area(cylinder_area(radius, length, matrix))
         if not area > 0:
             self._no_area(prim)
             return None

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..scene import Scene
 from ._pxr import Sdf, Usd, UsdShade
+from .binding import Bindings
 from .color_space import check_color_space
 from .inputs import Inputs, is_node
 from .report import Report
@@ -322,6 +323,7 @@ class Materials:
         self._surfaces: dict[Sdf.Path, Surface | None] = {}
         self._display: dict[str, int] = {}
         self._ids: dict[str, int] = {}
+        self._bindings = Bindings(inputs.report)
 
     def bound_surface(self, prim: Usd.Prim) -> Surface | None:
         """The surface bound to a prim: directly, by collection, or inherited.
@@ -329,6 +331,7 @@ class Materials:
         The binding for full renders counts; where that has no surface that we can draw, the one
         for previews.
         """
+        self._bindings.check(prim)
         binding = UsdShade.MaterialBindingAPI(prim)
         for purpose in (UsdShade.Tokens.full, UsdShade.Tokens.preview):
             material, _ = binding.ComputeBoundMaterial(purpose)

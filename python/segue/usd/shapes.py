@@ -167,10 +167,15 @@ def sphere() -> MeshData:
 
 
 def cube() -> MeshData:
-    """Cube from -1 to 1."""
-    corner = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], float)
+    """Cube from -1 to 1, its points, faces and corners in the order of OpenUSD's imaging.
+
+    The order is what primvars are authored in: around +Z from +X +Y, then around -Z from -X -Y;
+    the faces +Z, -Z, +Y, -Y, +X, -X.
+    """
+    rim = [[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]]
+    corner = np.array(rim + [[-x, -y, -z] for x, y, z in (rim[0], rim[3], rim[2], rim[1])], float)
     faces = np.array(
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+        [[0, 1, 2, 3], [4, 5, 6, 7], [0, 6, 5, 1], [4, 7, 3, 2], [0, 3, 7, 6], [4, 2, 1, 5]]
     )
     return _data(corner, faces, None)
 

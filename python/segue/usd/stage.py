@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import SegueError
 from ..scene import Scene
-from ._pxr import Tf, Usd, UsdGeom
+from ._pxr import Tf, Usd, UsdGeom, reason
+from .bounds import Bounds
 from .camera import CameraError, Frame, exposure_scale, find_camera, framing_camera, read_camera
 from .default_lights import add_default_lights, can_shine
 from .geometry import Geometry, geometry_light_targets
@@ -72,8 +73,7 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     try:
         stage = Usd.Stage.Open(name)
     except Tf.ErrorException as error:
-        reasons = " ".join(str(error.args[0].commentary if error.args else error).split())
-        raise StageError(f"{name} cannot be opened as USD: {reasons}") from None
+        raise StageError(f"{name} cannot be opened as USD: {reason(error)}") from None
     if not stage:
         raise StageError(f"{name} cannot be opened as USD")
     return stage
@@ -103,7 +103,7 @@ def load(
         scene: scene to add to; None: a new one.
 
     Raises:
-        StageError: the stage cannot be opened, or the camera does not exist.
+        StageError: the stage cannot be opened, or the camera does not exist or has no place.
     """
     is_path = isinstance(path_or_stage, (str, os.PathLike))
     stage = open_stage(path_or_stage) if is_path else path_or_stage
@@ -116,26 +116,25 @@ def load(
     settings = read_settings(stage, properties)
     purposes = settings.purposes if purposes is None else tuple(purposes)
     z_up = stage_is_z_up(stage)
-    # Light transport is linear: a camera's exposure is a factor on all that emits.
+    bounds = Bounds()
     try:
         camera_prim = find_camera(stage, camera or "", settings, report)
+        # Light transport is linear: a camera's exposure is a factor on all that emits.
         gain = exposure_scale(UsdGeom.Camera(camera_prim), properties) if camera_prim else 1.0
-        shot = (
-            read_camera(camera_prim, properties, settings, resolution)
-            if camera_prim
-            else framing_camera(stage, time, purposes, settings, resolution, z_up)
-        )
+        shot = read_camera(camera_prim, properties, settings, resolution) if camera_prim else None
     except CameraError as error:
         raise StageError(str(error)) from None
-    if camera_prim is None:
-        report.note("", "the stage has no camera", "one was made that sees all of it")
-    elif settings.has_shutter:
+    if camera_prim and settings.has_shutter:
         report_motion(camera_prim, properties)
-    target.set_camera(shot.name, shot.camera)
-
-    camera_to_world = np.reshape(shot.camera["transform"], (4, 4))
     with np.errstate(all="ignore"):  # what is not finite is looked for where it matters
-        counts = _fill(target, stage, properties, purposes, gain, z_up, camera_to_world)
+        counts = _fill(target, stage, properties, purposes, gain, z_up, bounds)
+        if shot is None:
+            report.note("", "the stage has no camera", "one was made that sees all of it")
+            shot = framing_camera(bounds, settings, resolution, z_up)
+    target.set_camera(shot.name, shot.camera)
+    if not counts["lights"] and not counts["emissive gprims"] and not can_shine(stage):
+        report.note("", "the stage has no light", "a grey sky and a lamp by the camera were added")
+        add_default_lights(target, np.reshape(shot.camera["transform"], (4, 4)), gain)
     value = None if time.IsDefault() or time.IsEarliestTime() else time.GetValue()
     return Imported(target, shot.name, shot.resolution, shot.crop, value, report, counts)
 
@@ -147,27 +146,27 @@ def _fill(
     purposes: tuple[str, ...],
     gain: float,
     z_up: bool,
-    camera: np.ndarray,
+    bounds: Bounds,
 ) -> dict[str, int]:
     """Adds the stage's lights and geometry; returns how many of what."""
     time, report = properties.time, properties.report
     inputs = Inputs(time, report)
     textures = Textures(scene, inputs)
     materials = Materials(scene, textures, inputs)
-    lights = Lights(scene, textures, properties, gain, z_up)
-    geometry = Geometry(scene, materials, lights, properties, gain)
+    lights = Lights(scene, textures, properties, gain, z_up, bounds)
+    geometry = Geometry(scene, materials, lights, properties, gain, bounds)
     items = Walker(stage, time, purposes, report).items()
     geometry.geometry_lights = geometry_light_targets([i.prim for i in items])
     for item in items:
         if item.prim.GetTypeName() == "GeometryLight":
             continue
-        if is_light(item.prim):
-            lights.add(item.prim, item.transforms)
-        else:
-            geometry.add(item)
-    if not lights.count and not geometry.emitters and not can_shine(stage):
-        report.note("", "the stage has no light", "a grey sky and a lamp by the camera were added")
-        add_default_lights(scene, camera, gain)
+        try:
+            if is_light(item.prim):
+                lights.add(item.prim, item.transforms)
+            else:
+                geometry.add(item)
+        except Tf.ErrorException as error:
+            report.warning(item.prim, reason(error), "left out")
     return {"gprims": len(items), "lights": lights.count, "emissive gprims": geometry.emitters}
 
 

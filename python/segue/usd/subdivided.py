@@ -139,7 +139,7 @@ def _read_sharpness(mesh: UsdGeom.Mesh, time: Usd.TimeCode, cage: Cage, report: 
     """Creases (chains of vertices with a sharpness for the chain or for each edge) and corners."""
     chain = numbers(mesh.GetCreaseIndicesAttr(), time)
     lengths = numbers(mesh.GetCreaseLengthsAttr(), time)
-    sharpness = np.asarray(mesh.GetCreaseSharpnessesAttr().Get(time) or (), np.float64)
+    sharpness = _floats(mesh.GetCreaseSharpnessesAttr(), time)
     if chain is not None and lengths is not None and len(lengths):
         per_edge = np.maximum(lengths - 1, 0)
         if len(sharpness) == len(lengths):
@@ -155,7 +155,7 @@ def _read_sharpness(mesh: UsdGeom.Mesh, time: Usd.TimeCode, cage: Cage, report: 
         else:
             report.warning(mesh.GetPrim(), "creases that do not fit the mesh", "they are ignored")
     corners = numbers(mesh.GetCornerIndicesAttr(), time)
-    sharpness = np.asarray(mesh.GetCornerSharpnessesAttr().Get(time) or (), np.float64)
+    sharpness = _floats(mesh.GetCornerSharpnessesAttr(), time)
     if corners is None or not len(corners):
         return
     if len(sharpness) == len(corners) and corners.min() >= 0 and corners.max() < cage.points:
@@ -163,6 +163,13 @@ def _read_sharpness(mesh: UsdGeom.Mesh, time: Usd.TimeCode, cage: Cage, report: 
         cage.corner_sharpness[corners] = _sharp(sharpness)
     else:
         report.warning(mesh.GetPrim(), "corners that do not fit the mesh", "they are ignored")
+
+
+def _floats(attribute: Usd.Attribute, time: Usd.TimeCode) -> np.ndarray:
+    """An attribute's numbers; none, which fit nothing, where they are of another kind."""
+    values = np.asarray(attribute.Get(time))
+    fits = values.ndim == 1 and values.dtype.kind in "fiu"
+    return values.astype(np.float64) if fits else np.zeros(0)
 
 
 def _sharp(values: np.ndarray) -> np.ndarray:

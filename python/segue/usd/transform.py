@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from ._pxr import Gf
+from ._pxr import Gf, Tf, Usd, UsdGeom
+from .report import Report
 
 
 def column_matrix(matrix: Gf.Matrix4d) -> np.ndarray:
@@ -49,6 +48,53 @@ def is_usable(matrices: np.ndarray) -> np.ndarray:
     return result
 
 
-def local_matrix(xformable: Any, time: Any) -> tuple[Gf.Matrix4d, bool]:
-    """A prim's own transformation, and whether it resets the stack."""
-    return xformable.GetLocalTransformation(time), xformable.GetResetXformStack()
+def local_matrix(
+    xformable: UsdGeom.Xformable, time: Usd.TimeCode, report: Report
+) -> tuple[Gf.Matrix4d, bool]:
+    """A prim's own transformation, and whether it resets the stack.
+
+    Operations that cannot be read are left away, with a warning.
+    """
+    reset = xformable.GetResetXformStack()
+    try:
+        return xformable.GetLocalTransformation(time), reset
+    except Tf.ErrorException:
+        pass
+    matrix = Gf.Matrix4d(1)
+    for operation in _operations(xformable, report):
+        matrix = _operation_matrix(operation, time, report) * matrix
+    return matrix, reset
+
+
+def _operation_matrix(
+    operation: UsdGeom.XformOp, time: Usd.TimeCode, report: Report
+) -> Gf.Matrix4d:
+    try:
+        return operation.GetOpTransform(time)
+    except Tf.ErrorException:
+        attribute = operation.GetAttr()
+        what = f"{attribute.GetName()} has no value that can be used"
+        report.warning(attribute.GetPrim(), what, "it is left away")
+        return Gf.Matrix4d(1)
+
+
+def _operations(xformable: UsdGeom.Xformable, report: Report) -> list[UsdGeom.XformOp]:
+    try:
+        return xformable.GetOrderedXformOps()
+    except Tf.ErrorException:
+        report.warning(xformable, "an xformOpOrder that cannot be used", "it is left away")
+        return []
+
+
+def world_matrix(prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> Gf.Matrix4d:
+    """A prim's transformation to the world."""
+    matrix = Gf.Matrix4d(1)
+    while prim:
+        xformable = UsdGeom.Xformable(prim)
+        if xformable:
+            own, reset = local_matrix(xformable, time, report)
+            matrix = matrix * own
+            if reset:
+                break
+        prim = prim.GetParent()
+    return matrix

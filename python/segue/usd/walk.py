@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ._pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
+from ._pxr import Gf, Tf, Usd, UsdGeom, UsdLux, UsdShade, reason
 from .instancer import instance_transforms
 from .report import Report
 from .transform import column_matrix, compose, local_matrix
@@ -109,6 +109,7 @@ class Walker:
             own = self._own_state(prim, inherited)
             if own is None:
                 continue
+            self._check_type(prim)
             if prim.IsInstance():
                 self._instance(prim, own, predicate, scope)
                 continue
@@ -122,6 +123,12 @@ class Walker:
             stack.extend((child, own) for child in reversed(children))
         return scope.close()
 
+    def _check_type(self, prim: Usd.Prim) -> None:
+        """Reports prims of schemas that are not installed: nothing is known of what they draw."""
+        name = prim.GetTypeName()
+        if name and prim.GetPrimTypeInfo().GetSchemaType().isUnknown:
+            self._report.unsupported(prim, f"prims of the unknown type '{name}'", "left out")
+
     def _own_state(self, prim: Usd.Prim, state: _State) -> _State | None:
         """What holds at a prim and below it; None if it is invisible."""
         imageable = UsdGeom.Imageable(prim)
@@ -133,7 +140,7 @@ class Walker:
         xformable = UsdGeom.Xformable(prim)
         if not xformable:
             return state
-        own, reset = local_matrix(xformable, self._time)
+        own, reset = local_matrix(xformable, self._time, self._report)
         return _State(
             own if reset else own * state.matrix,
             reset or state.absolute,
@@ -200,7 +207,11 @@ class Walker:
         return result
 
     def _point_instancer(self, prim: Usd.Prim, state: _State, scope: _Scope) -> None:
-        groups = instance_transforms(UsdGeom.PointInstancer(prim), self._time, self._report)
+        try:
+            groups = instance_transforms(UsdGeom.PointInstancer(prim), self._time, self._report)
+        except Tf.ErrorException as error:
+            self._report.warning(prim, reason(error), "left out")
+            return
         # A prototype is drawn wherever it is defined: below an `over`, a class, or the instancer.
         predicate = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
         outer = column_matrix(state.matrix)[None]
