@@ -7,7 +7,7 @@ use glam::{DMat4, DVec3, Vec2, Vec3};
 use segue::math::sampler::hash_unit;
 use segue::math::warp;
 use segue::shading::World;
-use segue::transport::area::Cell;
+use segue::transport::area::unit_plane_cut;
 use segue::transport::cluster::{Areas, Clusters, Numbered};
 use segue::transport::grid::Grid;
 use segue::transport::store::{Arrival, Arrivals};
@@ -37,8 +37,8 @@ fn both_areas(world: &World, grid: &Grid, all: Numbered) -> [Vec<f32>; 2] {
     let by_rays = each.clone().map(|c| 1.0 / c.inverse_area);
     let by_plane = each.map(|c| {
         let representative = all.get(clusters.order[c.first as usize]);
-        let voxel = grid.voxel(representative.position);
-        Cell { grid, voxel, representative: &representative, parted: None }.plane_cut(representative.position)
+        let (low, edge) = grid.place(&grid.voxel(representative.position));
+        edge * edge * unit_plane_cut((representative.position - low) / edge, representative.normal)
     });
     [by_rays.collect(), by_plane.collect()]
 }
