@@ -39,7 +39,7 @@ class SegueRenderEngine(bpy.types.RenderEngine):
         that reaches it is only printed: so whatever happens, a result is merged and errors are
         reported.
         """
-        frame = job.Frame(self, depsgraph.view_layer_eval)
+        frame = job.Frame(self, depsgraph)
         try:
             frame.clear()
             job.run(self, depsgraph, frame)

@@ -11,7 +11,7 @@ import numpy as np
 from . import history, library, passes
 from .export.camera import export_camera
 from .export.depsgraph import Exporter
-from .export.settings import film_size, render_settings
+from .export.settings import film_exposure, film_size, render_settings
 from .log import ExportLog
 
 if TYPE_CHECKING:
@@ -27,10 +27,12 @@ _FIRST_DISPLAY = 0.25
 class Frame:
     """The pixels of one view layer on Blender's side; row 0 of its arrays is on top."""
 
-    def __init__(self, engine: SegueRenderEngine, view_layer: bpy.types.ViewLayer) -> None:
+    def __init__(self, engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph) -> None:
+        view_layer = depsgraph.view_layer_eval
         self.engine = engine
         self.layer = view_layer.name
         self.passes = list(passes.enabled(view_layer))
+        self.exposure = film_exposure(depsgraph.scene_eval)
         self.width = 0
         self.height = 0
 
@@ -53,6 +55,7 @@ class Frame:
     ) -> None:
         """Merge passes by Blender's names, all of one size, with their top left corner at `origin`.
 
+        The film's exposure, which the engine knows nothing of, brightens those that hold light.
         Passes that are not given become black; with no pass at all the whole frame does.
         """
         engine = self.engine
@@ -69,6 +72,9 @@ class Frame:
             values = pixels.get(target.name)
             if values is None:
                 values = np.zeros(width * height * target.channels, np.float32)
+            elif target.name in passes.LIGHT and self.exposure != 1.0:
+                values = values.copy()
+                values[..., :3] *= np.float32(self.exposure)
             target.rect.foreach_set(np.ascontiguousarray(values[::-1], np.float32).ravel())
         engine.end_result(result)
 
@@ -160,14 +166,14 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
             engine.active_view_set(view)
         export_camera(scene, engine, depsgraph, log)
         settings = render_settings(depsgraph, frame, film_size(engine), preview=engine.is_preview)
-        if index == 0:
-            _report(engine, log, scene.info())
+        _report(engine, log, scene.info())
         engine.update_stats(frame.layer, "Building the acceleration structure")
         render = segue.Render(scene, settings)
         monitor = _Monitor(engine, frame, render, view, (index, len(views)), segue.error_text)
         finished = render.run(progress=monitor.progress, tile=monitor.tile)
         frame.write(_read_passes(render, frame), view=view)
         stats = render.stats()
+        _report(engine, log, stats)
         error = segue.error_text(stats)
         _finish(engine, frame, stats, error)
         if not engine.is_preview:
@@ -185,11 +191,16 @@ def _read_passes(render: Any, frame: Frame) -> dict[str, np.ndarray]:
 
 
 def _report(engine: SegueRenderEngine, log: ExportLog, info: dict[str, Any]) -> None:
-    """Tell the user what the export changed, in Blender's info log."""
+    """Tell the user in Blender's info log what is new of what the export and the engine changed.
+
+    The engine speaks of the scene in its info, and of what it found while building and rendering
+    in its statistics.
+    """
     for message in info.get("warnings", []):
         log.warn(message)
+    news = log.news()
     if not engine.is_preview:
-        for message in log.messages:
+        for message in news:
             engine.report({"WARNING"}, f"Segue: {message}")
 
 

@@ -12,6 +12,7 @@ class ExportLog:
 
     def __init__(self) -> None:
         self._messages: dict[str, None] = {}
+        self._told = 0
 
     def warn(self, message: str) -> None:
         """Note `message`; a repetition of an earlier one is dropped."""
@@ -19,7 +20,8 @@ class ExportLog:
             self._messages[message] = None
             logger.warning("%s", message)
 
-    @property
-    def messages(self) -> list[str]:
-        """Every distinct warning so far."""
-        return list(self._messages)
+    def news(self) -> list[str]:
+        """The warnings since the last call, or since the start."""
+        messages = list(self._messages)[self._told :]
+        self._told += len(messages)
+        return messages

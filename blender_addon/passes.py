@@ -54,6 +54,13 @@ PASSES: tuple[RenderPass, ...] = (
     RenderPass("Indirect", "Indirect", "RGB", "COLOR", "use_pass_indirect", custom=True),
 )
 
+# Blender's names of the passes that hold light, and not data.
+LIGHT = frozenset(
+    render_pass.name
+    for render_pass in PASSES
+    if render_pass.source in {"Combined", "Emission", "Direct", "Indirect"}
+)
+
 # Switches of Blender's own view layer that Segue has no pass for.
 _UNSUPPORTED = (
     "use_pass_mist",
@@ -76,7 +83,21 @@ _UNSUPPORTED = (
     "use_pass_cryptomatte_object",
     "use_pass_cryptomatte_material",
     "use_pass_cryptomatte_asset",
+    "use_pass_grease_pencil",
 )
+
+# The same for the switches that Cycles adds to a view layer, and their labels in its panels.
+_UNSUPPORTED_CYCLES = {
+    "use_pass_volume_direct": "Volume Direct",
+    "use_pass_volume_indirect": "Volume Indirect",
+    "use_pass_volume_scatter": "Volume Scatter",
+    "use_pass_volume_transmit": "Volume Transmit",
+    "use_pass_volume_majorant": "Volume Majorant",
+    "use_pass_shadow_catcher": "Shadow Catcher",
+    "denoising_store_passes": "Denoising Data",
+    "pass_debug_sample_count": "Sample Count",
+    "pass_render_time": "Render Time",
+}
 
 
 def enabled(view_layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
@@ -90,8 +111,15 @@ def enabled(view_layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
 def unsupported(view_layer: bpy.types.ViewLayer) -> list[str]:
     """Labels of the passes that are switched on and that Segue cannot render."""
     properties = view_layer.bl_rna.properties
-    return [
+    names = [
         properties[switch].name
         for switch in _UNSUPPORTED
         if switch in properties and getattr(view_layer, switch)
     ]
+    cycles = getattr(view_layer, "cycles", None)
+    names += [
+        label for switch, label in _UNSUPPORTED_CYCLES.items() if getattr(cycles, switch, False)
+    ]
+    names += [f"AOV '{aov.name}'" for aov in view_layer.aovs]
+    names += [f"Light Group '{group.name}'" for group in view_layer.lightgroups]
+    return names

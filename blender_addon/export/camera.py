@@ -10,6 +10,9 @@ from mathutils import Matrix
 
 from ..log import ExportLog
 
+# The ABI's default for the far end.
+_NO_CLIPPING = 1e30
+
 
 def camera_window(
     camera: bpy.types.Camera,
@@ -71,12 +74,19 @@ def camera_json(
             f"Camera '{camera_object.name}': a {camera.type.lower()} lens is not supported, "
             "a perspective one of the same focal length is used"
         )
+    near, far = camera.clip_start, camera.clip_end
+    if near >= far:
+        log.warn(
+            f"Camera '{camera_object.name}': its clipping range from {near:.6g} to {far:.6g} is "
+            "empty, nothing is clipped"
+        )
+        near, far = 0.0, _NO_CLIPPING
     result: dict[str, Any] = {
         "type": "orthographic" if orthographic else "perspective",
         "transform": [value for row in matrix for value in row],
         "window": camera_window(camera, resolution, pixel_aspect, shift_x),
-        "near": camera.clip_start,
-        "far": camera.clip_end,
+        "near": near,
+        "far": far,
     }
     dof = camera.dof
     if dof.use_dof:
@@ -108,10 +118,13 @@ def export_camera(
     camera = engine.camera_override
     if camera is None or camera.type != "CAMERA":
         raise ValueError("the scene has no camera")
+    matrix = engine.camera_model_matrix(camera)
+    if not all(math.isfinite(value) for row in matrix for value in row):
+        raise ValueError(f"camera '{camera.name}': its transform is not finite")
     render = depsgraph.scene_eval.render
     data = camera_json(
         camera,
-        engine.camera_model_matrix(camera),
+        matrix,
         (engine.resolution_x, engine.resolution_y),
         (render.pixel_aspect_x, render.pixel_aspect_y),
         engine.camera_shift_x(camera),

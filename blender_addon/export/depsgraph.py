@@ -60,8 +60,13 @@ class Exporter:
             arrays = MeshArrays(group.mesh)
             self._meshes[pointer] = None
             if arrays.triangle_count:
+                textures = self._translator.textures
                 self._meshes[pointer] = add_mesh(
-                    self._segue, self.scene, arrays, self._translator.attributes
+                    self._segue,
+                    self.scene,
+                    arrays,
+                    readings=textures.readings,
+                    uvs=textures.uvs,
                 )
         mesh = self._meshes[pointer]
         if mesh is None:
@@ -97,6 +102,12 @@ def _warn_scene(depsgraph: bpy.types.Depsgraph, log: ExportLog) -> None:
         log.warn("Motion blur is not supported, the scene stands still while the shutter is open")
     if render.use_freestyle:
         log.warn("Freestyle lines are not rendered")
+    cycles = getattr(depsgraph.scene_eval, "cycles", None)
+    for kind in ("reflective", "refractive"):
+        if not getattr(cycles, f"caustics_{kind}", True):
+            log.warn(f"Leaving out {kind} caustics is not supported, they are rendered")
+    if render.film_transparent and getattr(cycles, "film_transparent_glass", False):
+        log.warn("Transparent glass is not supported, glass hides the transparent background")
     # Blender 5.0 made the working space a property of the file.
     space = getattr(bpy.data, "colorspace", None)
     if space is not None and space.working_space != "Linear Rec.709":

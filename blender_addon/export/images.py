@@ -89,12 +89,15 @@ def read_image(image: bpy.types.Image, log: ExportLog, *, straight_alpha: bool) 
 
 
 def _alpha(image: bpy.types.Image, values: np.ndarray, straight: bool) -> np.ndarray:
-    """Bring colour and alpha into the wanted relation. Byte pixels are straight, float ones not."""
+    """Bring colour and alpha into the wanted relation. Byte pixels are straight, float ones not.
+
+    The channels of data, such as normals and roughness, have nothing to do with one another.
+    """
     if image.alpha_mode == "NONE":
         values = values.copy()
         values[..., 3] = 1.0
         return values
-    if image.alpha_mode == "CHANNEL_PACKED":
+    if image.alpha_mode == "CHANNEL_PACKED" or image.colorspace_settings.is_data:
         return values
     alpha = values[..., 3:]
     if image.is_float and straight:

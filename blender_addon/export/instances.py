@@ -110,8 +110,11 @@ def _warn_particles(item: bpy.types.Object, log: ExportLog) -> None:
 class _Surveyor:
     """Walks the depsgraph once. Objects of instances live only for one step of the walk."""
 
-    def __init__(self, depsgraph: bpy.types.Depsgraph, log: ExportLog) -> None:
+    def __init__(
+        self, depsgraph: bpy.types.Depsgraph, matrices: np.ndarray, log: ExportLog
+    ) -> None:
         self.depsgraph = depsgraph
+        self.finite = np.isfinite(matrices).all(axis=(1, 2))
         self.view_layer = depsgraph.view_layer
         self.override = depsgraph.view_layer_eval.material_override
         self.log = log
@@ -125,7 +128,9 @@ class _Surveyor:
         if not instance.show_self:
             return
         item = instance.object
-        if item.type == "MESH":
+        if item.type in {"MESH", "LIGHT"} and not self.finite[index]:
+            self.log.warn(f"Object '{item.name}': its transform is not finite, it is left out")
+        elif item.type == "MESH":
             if not _visible(item):
                 return
             parent = instance.parent if instance.is_instance else None
@@ -177,7 +182,7 @@ def survey(
         entries.foreach_get("matrix_world", matrices)
     # Blender stores columns first.
     matrices = matrices.reshape(-1, 4, 4).transpose(0, 2, 1).astype(np.float64)
-    surveyor = _Surveyor(depsgraph, log)
+    surveyor = _Surveyor(depsgraph, matrices, log)
     for index, instance in enumerate(entries):
         if index % _STOP_INTERVAL == 0 and stop():
             return None

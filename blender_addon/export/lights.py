@@ -11,6 +11,16 @@ import numpy as np
 from ..log import ExportLog
 from ..nodes.material import Translator
 
+# Cycles' default limit of a light's bounces, which is none in practice.
+ALL_BOUNCES = 1024
+
+# Above this radius the light of a sphere differs visibly from that of Cycles' disk: by 2 % three
+# metres away.
+_LARGE_RADIUS = 0.5
+
+# Scales of a spot's axes that differ less are equal but for rounding.
+_EQUAL_SCALES = 1e-3
+
 
 def _color(light: bpy.types.Light, translator: Translator) -> np.ndarray:
     """Power (or irradiance, for suns) per channel."""
@@ -28,6 +38,16 @@ def _color(light: bpy.types.Light, translator: Translator) -> np.ndarray:
 def _warn(name: str, light: bpy.types.Light, log: ExportLog) -> None:
     if not light.use_shadow:
         log.warn(f"Light '{name}': lights without shadows are not supported, it casts them")
+    if getattr(getattr(light, "cycles", None), "max_bounces", ALL_BOUNCES) < ALL_BOUNCES:
+        log.warn(
+            f"Light '{name}': a limit of bounces of a light is not supported, all are followed"
+        )
+    soft = light.type in {"POINT", "SPOT"} and light.use_soft_falloff
+    if soft and light.shadow_soft_size > _LARGE_RADIUS:
+        log.warn(
+            f"Light '{name}': soft falloff is not supported, its light falls off as that of a "
+            "sphere, which is brighter near by"
+        )
 
 
 def _pose(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -97,6 +117,9 @@ def light_json(
         return None
     _warn(name, light, log)
     color = _color(light, translator)
+    if not np.isfinite(color).all():
+        log.warn(f"Light '{name}': its power is not finite, it is left out")
+        return None
     if (color < 0.0).any():
         log.warn(f"Light '{name}': negative light is not supported, that part is left out")
         color = np.maximum(color, 0.0)
@@ -112,6 +135,10 @@ def light_json(
     else:
         result = _ball(light, color)
         if light.type == "SPOT":
+            if scale.max() > scale.min() * (1.0 + _EQUAL_SCALES):
+                log.warn(
+                    f"Light '{name}': a spot of unequal scale is not supported, its cone is round"
+                )
             result["shaping"] = {"spot_size": light.spot_size, "spot_blend": light.spot_blend}
     result["transform"] = pose.ravel().tolist()
     result["camera_visible"] = camera_visible

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -113,22 +114,76 @@ class MeshArrays:
             return values, "corner", self.corners
         if attribute.domain == "FACE":
             return values[self.polygons], "face", None
+        if attribute.domain == "EDGE":
+            return self._points_of_edges(values), "vertex", None
         return None
 
+    def _points_of_edges(self, values: np.ndarray) -> np.ndarray:
+        """At each point the mean over the edges that meet there, as Blender takes it."""
+        mesh = self.mesh
+        ends = _get(mesh.edges, "vertices", 2 * len(mesh.edges), np.int32)
+        count = np.bincount(ends, minlength=len(mesh.vertices))
+        result = np.empty((len(mesh.vertices), values.shape[1]), np.float32)
+        for column, target in zip(values.T, result.T, strict=True):
+            sums = np.bincount(ends, np.repeat(column, 2), minlength=len(mesh.vertices))
+            target[:] = sums / np.maximum(count, 1)
+        return result
 
-def add_mesh(segue: Any, scene: Any, arrays: MeshArrays, wanted: Collection[str]) -> int:
-    """Add a mesh with its UV maps and those of the `wanted` attributes that it has."""
+
+@dataclass(frozen=True)
+class Reading:
+    """What a shader reads of an attribute: `affine`, three rows of four, times its components.
+
+    With `factor` they are one number: as in Cycles the mean of a vector or colour, and the first of
+    two.
+    """
+
+    name: str
+    factor: bool
+    affine: tuple[float, ...]
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        """What is read of an attribute with 2, 3 or 4 components; an alpha stays as it is."""
+        if self.factor:
+            values = values[:, :1] if values.shape[1] == 2 else values[:, :3]
+            values = np.repeat(values.mean(axis=1, keepdims=True), 3, axis=1)
+        elif values.shape[1] == 2:
+            values = np.pad(values, ((0, 0), (0, 1)))
+        matrix = np.array(self.affine, np.float32).reshape(3, 4)
+        result = values.copy()
+        result[:, :3] = values[:, :3] @ matrix[:, :3].T + matrix[:, 3]
+        return result
+
+
+def add_mesh(
+    segue: Any,
+    scene: Any,
+    arrays: MeshArrays,
+    *,
+    readings: Mapping[str, Reading],
+    uvs: Collection[str],
+) -> int:
+    """Add a mesh with its UV maps, other attributes that are read as `uvs`, and the `readings`.
+
+    The engine tells colours from UV maps by their number of components, so that one name may be
+    both.
+    """
     normals, interpolation = arrays.normals()
     uv_maps = arrays.uv_maps()
     attributes = [
         segue.Attribute(name, values, "corner", indices=arrays.corners) for name, values in uv_maps
     ]
     names = {name for name, _ in uv_maps}
-    for name in sorted(set(wanted) - names):
+    for name in sorted(set(uvs) - names):
         found = arrays.attribute(name)
         if found is not None:
             values, domain, indices = found
-            attributes.append(segue.Attribute(name, values, domain, indices=indices))
+            attributes.append(segue.Attribute(name, values[:, :2], domain, indices=indices))
+    for name, reading in readings.items():
+        found = arrays.attribute(reading.name)
+        if found is not None:
+            values, domain, indices = found
+            attributes.append(segue.Attribute(name, reading.apply(values), domain, indices=indices))
     return scene.add_mesh(
         arrays.mesh.name,
         arrays.points,

@@ -50,6 +50,11 @@ def film_size(engine: bpy.types.RenderEngine) -> tuple[int, int]:
     return engine.resolution_x, engine.resolution_y
 
 
+def film_exposure(scene: bpy.types.Scene) -> float:
+    """What Cycles multiplies a picture by; 1 where its settings are missing."""
+    return float(getattr(getattr(scene, "cycles", None), "film_exposure", 1.0))
+
+
 def crop(
     render: bpy.types.RenderSettings, resolution: tuple[int, int], size: tuple[int, int]
 ) -> list[int]:

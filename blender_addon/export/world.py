@@ -9,11 +9,19 @@ import numpy as np
 
 from ..log import ExportLog
 from ..nodes.material import Translator
-from ..nodes.values import AttributeValue, Constant, ImageValue
+from ..nodes.values import AttributeValue, Constant, ImageValue, negative
+from .lights import ALL_BOUNCES
 
 # Columns: where the axes of the ABI's dome lie in Blender's world. Blender's map has +X in its
 # centre column, +Y a quarter to the left and +Z on top.
 _BLENDER_FROM_DOME = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+_RAY_FLAGS = {
+    "diffuse": "diffuse",
+    "glossy": "glossy",
+    "transmission": "transmission",
+    "scatter": "volume scatter",
+}
 
 
 def world_json(
@@ -26,20 +34,39 @@ def world_json(
         value = Constant.color(world.color)
     else:
         value = translator.world_radiance(world)
+    name = f"World '{world.name}'"
+    if negative(value):
+        log.warn(f"{name}: negative light is not supported, that part is left out")
     visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
     result: dict[str, Any] = {"type": "dome", "camera_visible": visible}
     if isinstance(value, ImageValue):
-        if value.gain == 0.0:
+        if value.gain <= 0.0:
             return None
+        _warn_world(name, world, log)
         result["radiance"] = [value.gain] * 3
         result["image"] = translator.textures.image(value.source)
         result["transform"] = _dome_transform(world.name, value.sampling.matrix, log)
         return result
     assert not isinstance(value, AttributeValue)
-    if not any(value.rgb):
+    radiance = [max(channel, 0.0) for channel in value.rgb]
+    if not any(radiance):
         return None
-    result["radiance"] = list(value.rgb)
+    _warn_world(name, world, log)
+    result["radiance"] = radiance
     return result
+
+
+def _warn_world(name: str, world: bpy.types.World, log: ExportLog) -> None:
+    """Name what a world that shines asks for and Segue lacks."""
+    flags = getattr(world, "cycles_visibility", None)
+    hidden = [label for flag, label in _RAY_FLAGS.items() if not getattr(flags, flag, True)]
+    if hidden:
+        log.warn(
+            f"{name}: only the camera can be kept from seeing a world, "
+            f"it stays visible to {', '.join(hidden)} rays"
+        )
+    if getattr(getattr(world, "cycles", None), "max_bounces", ALL_BOUNCES) < ALL_BOUNCES:
+        log.warn(f"{name}: a limit of bounces of a world is not supported, all are followed")
 
 
 def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> list[float]:
@@ -69,5 +96,12 @@ def export_world(
         return
     world = getattr(view_layer, "world_override", None) or depsgraph.scene_eval.world
     data = world_json(world, translator, log)
-    if data is not None:
-        scene.add_light(world.name, data)
+    if data is None:
+        return
+    scene.add_light(world.name, data)
+    seen = data["camera_visible"] and not depsgraph.scene_eval.render.film_transparent
+    if seen and view_layer.use_pass_emit:
+        log.warn(
+            f"View layer '{view_layer.name}': the Emission pass holds the background of the world "
+            "too, which Cycles keeps in the Environment pass"
+        )

@@ -10,7 +10,7 @@ import bpy
 from .evaluate import Evaluator
 from .fresnel import fresnel_ior, layered
 from .tree import Stack, is_linked, resolve, socket
-from .values import KINDS, Constant, ImageValue, convert
+from .values import KINDS, Constant, ImageValue, Value, convert, negative
 
 Closure = dict[str, Any]
 
@@ -105,6 +105,13 @@ SHADERS: dict[str, Shader] = {
     ),
 }
 
+# The ABI has no shared closures: a branch that is used twice counts twice, and a few dozen nodes
+# that share what is below them would become billions. Surfaces that make sense stay far below.
+_MOST_SHADERS = 256
+
+# Below this roughness microfacets scatter less than a hundredth of the light more than once.
+_VISIBLY_ROUGH = 0.3
+
 # Shaders without a counterpart: the closure that comes nearest, and how that is said.
 _NEAREST: dict[str, tuple[str, str]] = {
     "ShaderNodeBsdfToon": ("diffuse", "a diffuse surface is used"),
@@ -117,10 +124,13 @@ _NEAREST: dict[str, tuple[str, str]] = {
 
 
 class ClosureTranslator:
-    """Translates the closures of one node tree."""
+    """Translates the closures of one node tree, each once however often it is used."""
 
     def __init__(self, evaluator: Evaluator) -> None:
         self.ev = evaluator
+        self._memo: dict[tuple, Closure] = {}
+        # Number of shaders in each closure, by identity.
+        self._sizes: dict[int, int] = {}
 
     def closure(self, entry: bpy.types.NodeSocket, stack: Stack = ()) -> Closure:
         """The closure that arrives at a shader input; black where nothing does."""
@@ -136,15 +146,22 @@ class ClosureTranslator:
                 "color": self.ev.textures.json(value, "color"),
                 "strength": 1.0,
             }
+        if source.key not in self._memo:
+            closure = self._node(node, source.stack)
+            self._sizes[id(closure)] = self._size(closure)
+            self._memo[source.key] = closure
+        return self._memo[source.key]
+
+    def _node(self, node: bpy.types.Node, stack: Stack) -> Closure:
         if node.bl_idname == "ShaderNodeMixShader":
-            return self._mix(node, source.stack)
+            return self._mix(node, stack)
         if node.bl_idname == "ShaderNodeAddShader":
-            a, b = (self.closure(entry, source.stack) for entry in node.inputs)
-            return {"type": "add", "a": a, "b": b}
+            a, b = (self.closure(entry, stack) for entry in node.inputs)
+            return self._limited(node, {"type": "add", "a": a, "b": b})
         shader = SHADERS.get(node.bl_idname)
         if shader is None:
-            return self._nearest(node, source.stack)
-        return self._shader(node, shader, source.stack)
+            return self._nearest(node, stack)
+        return self._shader(node, shader, stack)
 
     def _mix(self, node: bpy.types.Node, stack: Stack) -> Closure:
         ior = fresnel_ior(self.ev, resolve(node.inputs[0], stack))
@@ -160,12 +177,27 @@ class ClosureTranslator:
             if share in {0.0, 1.0}:
                 return self.closure(node.inputs[1 + int(share)], stack)
             factor = Constant.number(share)
-        return {
-            "type": "mix",
-            "factor": self.ev.textures.json(factor, "float"),
-            "a": self.closure(node.inputs[1], stack),
-            "b": self.closure(node.inputs[2], stack),
-        }
+        a, b = (self.closure(entry, stack) for entry in node.inputs[1:])
+        if a == b:
+            return a
+        return self._limited(
+            node,
+            {"type": "mix", "factor": self.ev.textures.json(factor, "float"), "a": a, "b": b},
+        )
+
+    def _limited(self, node: bpy.types.Node, closure: Closure) -> Closure:
+        """A pair of closures, or the first one where together they are too many."""
+        if self._size(closure) <= _MOST_SHADERS:
+            return closure
+        self.ev.warn(node, f"a surface of more than {_MOST_SHADERS} shaders", "the first is used")
+        return closure["a"]
+
+    def _size(self, closure: Closure) -> int:
+        if id(closure) in self._sizes:
+            return self._sizes[id(closure)]
+        if closure["type"] not in {"mix", "add"}:
+            return 1
+        return self._size(closure["a"]) + self._size(closure["b"])
 
     def _nearest(self, node: bpy.types.Node, stack: Stack) -> Closure:
         kind, text = _NEAREST.get(node.bl_idname, ("black", "black is used"))
@@ -180,16 +212,20 @@ class ClosureTranslator:
 
     def _shader(self, node: bpy.types.Node, shader: Shader, stack: Stack) -> Closure:
         result: Closure = {"type": shader.closure, **shader.extra}
+        values: dict[str, Value] = {}
         for key, identifier in shader.keys.items():
             entry = socket(node, identifier)
             if entry is not None:
-                value = self.ev.value(entry, stack)
-                result[key] = self.ev.textures.json(value, KINDS[entry.type])
+                values[key] = self.ev.value(entry, stack)
+                result[key] = self.ev.textures.json(values[key], KINDS[entry.type])
         for key, identifier in shader.normals.items():
             normal = self._normal(socket(node, identifier), stack)
             if normal is not None:
                 result[key] = normal
         self._warn_ignored(node, shader, stack)
+        for color, strength in (("color", "strength"), ("emission_color", "emission_strength")):
+            if strength in values:
+                self._warn_negative(node, values[color], values[strength])
         if node.bl_idname == "ShaderNodeBsdfPrincipled":
             return self._with_alpha(node, result, stack)
         return result
@@ -219,6 +255,14 @@ class ClosureTranslator:
                 self.ev.warn(node, f"'{entry.name}'", "it is left out")
         self._warn_special(node, stack)
 
+    def _warn_negative(self, node: bpy.types.Node, color: Value, strength: Value) -> None:
+        if isinstance(color, Constant) and isinstance(strength, Constant):
+            below = any(channel * strength.rgb[0] < 0.0 for channel in color.rgb)
+        else:
+            below = strength != Constant.number(0.0) and (negative(color) or negative(strength))
+        if below:
+            self.ev.warn(node, "negative emission", "that part is left out")
+
     def _warn_special(self, node: bpy.types.Node, stack: Stack) -> None:
         """Approximations that depend on more than one socket."""
         kind = node.bl_idname
@@ -235,6 +279,24 @@ class ClosureTranslator:
             self.ev.value(socket(node, "Roughness"), stack) != Constant.number(0.0)
         ):
             self.ev.warn(node, f"the {node.distribution.title()} distribution", "GGX is used")
+        if self._loses_light(node, stack):
+            self.ev.warn(node, "GGX that scatters once only", "Multiscatter GGX is used")
+
+    def _loses_light(self, node: bpy.types.Node, stack: Stack) -> bool:
+        """Whether the microfacets of a node visibly lose what they would scatter more than once."""
+        if (
+            getattr(node, "distribution", "") != "GGX"
+            or node.bl_idname == "ShaderNodeBsdfRefraction"
+        ):
+            return False
+        rough = self.ev.value(socket(node, "Roughness"), stack)
+        if isinstance(rough, Constant) and rough.rgb[0] < _VISIBLY_ROUGH:
+            return False
+        # What a varnish of low reflectance loses is little.
+        weights = [socket(node, name) for name in ("Metallic", "Transmission Weight")]
+        return node.bl_idname != "ShaderNodeBsdfPrincipled" or any(
+            self.ev.value(weight, stack) != Constant.number(0.0) for weight in weights
+        )
 
     def _normal(self, entry: bpy.types.NodeSocket | None, stack: Stack) -> dict[str, Any] | None:
         """The normal map at a Normal input; None for the surface's own normal."""

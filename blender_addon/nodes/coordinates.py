@@ -28,6 +28,10 @@ class Coordinates:
         """The six numbers of the ABI's texture transform; UV maps have a third component of 0."""
         return tuple(float(value) for value in self.matrix[:2][:, [0, 1, 3]].ravel())
 
+    def point(self) -> np.ndarray | None:
+        """The point that all coordinates are mapped to; None if they differ."""
+        return None if self.matrix[:3, :3].any() else self.matrix[:3, 3]
+
     def direction_matrix(self) -> tuple[float, ...]:
         """The nine numbers applied to a direction; one that is also shifted cannot be expressed."""
         if np.abs(self.matrix[:3, 3]).max() > 1e-6:
@@ -100,17 +104,33 @@ def evaluate_quietly(entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evalua
     return None if resolve(entry, stack).node is not None else evaluate(entry, stack)
 
 
+def equirectangular(direction: np.ndarray) -> tuple[float, float]:
+    """Where Blender looks a direction up in a picture, from the bottom left; 0 has no direction."""
+    length = np.linalg.norm(direction)
+    if length == 0.0:
+        return 0.0, 0.0
+    x, y, z = direction / length
+    return 0.5 - np.arctan2(y, x) / (2.0 * np.pi), 0.5 + np.arcsin(z) / np.pi
+
+
 def coordinates(
     entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate, *, world: bool
 ) -> Coordinates:
     """The coordinates that arrive at a texture's Vector input."""
     matrix = np.eye(4)
+    own = entry
     while True:
         source = resolve(entry, stack)
-        node, stack = source.node, source.stack
+        node = source.node
         if node is None:
-            # An unlinked input means the default UV map, and for a world the direction.
-            return Coordinates("environment" if world else "uv", "", matrix)
+            space = "environment" if world else "uv"
+            # Where nothing at all arrives at a texture it takes the default UV map, and in a world
+            # the direction; other nodes and groups take the constant of their own input.
+            if entry == own and not _has_constant(source, own):
+                return Coordinates(space, "", matrix)
+            constant = np.array(evaluate(entry, stack).rgb)
+            return Coordinates(space, "", _everywhere((matrix @ [*constant, 1.0])[:3]))
+        stack = source.stack
         if node.bl_idname == "ShaderNodeMapping":
             matrix = matrix @ _mapping(node, stack, evaluate)
             entry = node.inputs["Vector"]
@@ -120,6 +140,25 @@ def coordinates(
         else:
             space, uv = _origin(source, world)
             return Coordinates(space, uv, matrix)
+
+
+def _has_constant(source: Source, own: bpy.types.NodeSocket) -> bool:
+    """Whether a node on the way to a texture's unlinked input gives it a constant."""
+    last = source.socket
+    return (
+        last is not None
+        and last != own
+        and not last.node.mute
+        and last.node.bl_idname != "NodeReroute"
+    )
+
+
+def _everywhere(point: np.ndarray) -> np.ndarray:
+    """The matrix that maps everything to one point."""
+    result = np.zeros((4, 4))
+    result[:3, 3] = point
+    result[3, 3] = 1.0
+    return result
 
 
 def _origin(source: Source, world: bool) -> tuple[str, str]:

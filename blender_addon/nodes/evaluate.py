@@ -9,7 +9,7 @@ import numpy as np
 
 from ..log import ExportLog
 from .textures import TextureStore
-from .tree import Stack, resolve, socket
+from .tree import Source, Stack, resolve, socket
 from .value_nodes import VALUE_NODES
 from .values import (
     KINDS,
@@ -69,11 +69,14 @@ class Evaluator:
         """The value at an input, of the input's kind."""
         source = resolve(entry, stack)
         if source.node is not None:
-            value = self._output(source.node, source.output, source.stack)
+            value = self._output(source)
         elif source.socket is not None:
             value = self._default(source.socket)
         else:
             value = Constant.number(0.0)
+        if isinstance(value, Constant) and not np.isfinite(value.rgb).all():
+            self.warn(entry.node, f"a number that is not finite at '{entry.name}'", "0 is used")
+            value = Constant((0.0, 0.0, 0.0), value.kind)
         for kind in source.kinds:
             if kind in KINDS:
                 value = convert(value, KINDS[kind])
@@ -114,11 +117,10 @@ class Evaluator:
             else Constant.vector(entry.default_value)
         )
 
-    def _output(self, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-        key = (node.as_pointer(), output.identifier, tuple(group.as_pointer() for group in stack))
-        if key not in self._memo:
-            self._memo[key] = self._compute(node, output, stack)
-        return self._memo[key]
+    def _output(self, source: Source) -> Value:
+        if source.key not in self._memo:
+            self._memo[source.key] = self._compute(source.node, source.output, source.stack)
+        return self._memo[source.key]
 
     def _compute(self, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
         handler = VALUE_NODES.get(node.bl_idname)

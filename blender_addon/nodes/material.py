@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import bpy
 
 from ..log import ExportLog
-from .closures import BLACK, ClosureTranslator
+from .closures import BLACK, Closure, ClosureTranslator
 from .evaluate import Evaluator
+from .radiance import Radiance
 from .textures import TextureStore
-from .tree import Stack, is_linked, resolve, socket
-from .values import Constant, ImageValue, Value, average
+from .tree import is_linked, socket
+from .values import Constant, Value, average
 
 # What Cycles gives to a surface without a material: since 5.0 what a new material looks like.
 _DEFAULT_SURFACE: dict[str, Any] = (
@@ -30,11 +30,6 @@ class Translator:
         self._log = log
         self._materials: dict[int, int] = {}
         self.textures = TextureStore(scene, log)
-
-    @property
-    def attributes(self) -> set[str]:
-        """Names of the mesh attributes that the materials read, so far."""
-        return self.textures.attributes
 
     def material(self, material: bpy.types.Material | None) -> int:
         """Id of a material; None stands for an empty slot, which is grey."""
@@ -57,6 +52,13 @@ class Translator:
             return result
         owner = f"Material '{material.name}'"
         result["surface"] = self._surface(owner, output)
+        # Blender 4.2 moved this switch from Cycles' settings.
+        if not getattr(material, "use_transparent_shadow", True) and _lets_through(
+            result["surface"]
+        ):
+            self._log.warn(
+                f"{owner}: opaque shadows are not supported, its shadows are transparent"
+            )
         return result
 
     def _surface(self, owner: str, output: bpy.types.Node) -> dict[str, Any]:
@@ -78,7 +80,7 @@ class Translator:
         if is_linked(socket(output, "Volume")):
             self._log.warn(f"{owner}: volumes are not supported, the world is left empty")
         evaluator = Evaluator(owner, self.textures, self._log, world=True)
-        return _radiance(evaluator, socket(output, "Surface"), ())
+        return Radiance(evaluator).value(socket(output, "Surface"))
 
     def light_color(self, light: bpy.types.Light) -> tuple[float, float, float]:
         """What the nodes of a light multiply its power by."""
@@ -86,7 +88,7 @@ class Translator:
         if output is None:
             return (0.0, 0.0, 0.0)
         evaluator = Evaluator(f"Light '{light.name}'", self.textures, self._log)
-        value = _radiance(evaluator, socket(output, "Surface"), ())
+        value = Radiance(evaluator).value(socket(output, "Surface"))
         if not isinstance(value, Constant):
             self._log.warn(
                 f"Light '{light.name}': a textured light is not supported, its average is used"
@@ -94,26 +96,8 @@ class Translator:
         return average(value).rgb
 
 
-def _radiance(ev: Evaluator, entry: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Emission that arrives at a shader input, as one value."""
-    source = resolve(entry, stack)
-    node = source.node
-    if node is None:
-        return Constant.color((0.0, 0.0, 0.0))
-    stack = source.stack
-    if node.bl_idname in {"ShaderNodeBackground", "ShaderNodeEmission"}:
-        color, strength = ev.inputs(node, stack, "Color", "Strength")
-        if isinstance(color, ImageValue) and isinstance(strength, Constant):
-            return replace(color, gain=color.gain * strength.rgb[0])
-        return ev.combine(node, "color", lambda c, s: c * s, color, strength)
-    if node.bl_idname == "ShaderNodeAddShader":
-        parts = [_radiance(ev, part, stack) for part in node.inputs]
-        return ev.combine(node, "color", lambda a, b: a + b, *parts)
-    if node.bl_idname == "ShaderNodeMixShader":
-        factor = ev.value(node.inputs[0], stack)
-        if isinstance(factor, Constant) and factor.rgb[0] in {0.0, 1.0}:
-            return _radiance(ev, node.inputs[1 + int(factor.rgb[0])], stack)
-        parts = [_radiance(ev, part, stack) for part in node.inputs[1:]]
-        return ev.combine(node, "color", lambda t, a, b: a + (b - a) * t.clip(0, 1), factor, *parts)
-    ev.warn(node, "this shader", "black is used")
-    return Constant.color((0.0, 0.0, 0.0))
+def _lets_through(closure: Closure) -> bool:
+    """Whether a closure has a transparent part."""
+    if closure["type"] in {"mix", "add"}:
+        return _lets_through(closure["a"]) or _lets_through(closure["b"])
+    return closure["type"] == "transparent"

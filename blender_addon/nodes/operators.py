@@ -161,6 +161,24 @@ def hsv_to_rgb(hsv: Array) -> Array:
     return np.stack([((channel - 1) * s + 1) * v for channel in channels], axis=-1)
 
 
+def rgb_to_hsl(rgb: Array) -> Array:
+    """Hue, saturation and lightness, the hue in turns."""
+    high, low = rgb.max(axis=-1), rgb.min(axis=-1)
+    saturation = _safe_divide(high - low, 1 - np.abs(high + low - 1))
+    return np.stack([rgb_to_hsv(rgb)[..., 0], saturation, (high + low) / 2], axis=-1)
+
+
+def hsl_to_rgb(hsl: Array) -> Array:
+    """Inverse of `rgb_to_hsl`."""
+    hue = np.stack([hsl[..., 0], np.ones_like(hsl[..., 0]), np.ones_like(hsl[..., 0])], axis=-1)
+    saturation, lightness = hsl[..., 1:2], hsl[..., 2:]
+    return (hsv_to_rgb(hue) - 0.5) * (1 - np.abs(2 * lightness - 1)) * saturation + lightness
+
+
+# The models of Separate Color and Combine Color beside RGB, in both directions.
+COLOR_MODELS = {"HSV": (rgb_to_hsv, hsv_to_rgb), "HSL": (rgb_to_hsl, hsl_to_rgb)}
+
+
 def hue_saturation(
     color: Array, hue: Array, saturation: Array, value: Array, factor: Array
 ) -> Array:

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..export.images import Pixels, read_image
+from ..export.mesh import Reading
 from ..log import ExportLog
 from .values import AttributeValue, Constant, ImageSource, ImageValue, Kind, Value
 
@@ -37,6 +38,10 @@ class BlenderSource:
         """See `ImageSource`."""
         return self.pixels().linear()
 
+    def least(self) -> float:
+        """See `ImageSource`."""
+        return float(self.pixels().values.min())
+
 
 class TextureStore:
     """Adds images and textures to the scene, and remembers which are there."""
@@ -47,7 +52,10 @@ class TextureStore:
         self._sources: dict[tuple[int, bool], BlenderSource] = {}
         self._images: dict[int, tuple[ImageSource, int]] = {}
         self._textures: dict[str, int] = {}
-        self.attributes: set[str] = set()
+        # Attributes of meshes that are read as UV maps, and what is read of others, by the names
+        # that the scene knows it by.
+        self.uvs: set[str] = set()
+        self.readings: dict[str, Reading] = {}
 
     def source(self, image: bpy.types.Image, straight_alpha: bool) -> BlenderSource:
         """The source for an image, one for each treatment of its alpha."""
@@ -77,18 +85,17 @@ class TextureStore:
     ) -> int:
         """Id of the texture that yields `scale * value + bias`; an attribute is never scaled."""
         if isinstance(value, AttributeValue):
-            self.attributes.add(value.name)
-            name = value.name
+            name = self._reading(value)
             data: dict[str, Any] = {
                 "type": "attribute",
-                "name": value.name,
-                "default": [0.0, 0.0, 0.0, 1.0],
+                "name": name,
+                "default": [*value.matrix[:, 3].tolist(), 1.0],
             }
         else:
             sampling = value.sampling
             scale = [factor * value.gain for factor in scale]
             if sampling.uv:
-                self.attributes.add(sampling.uv)
+                self.uvs.add(sampling.uv)
             name = value.source.name
             data = {
                 "type": "image",
@@ -105,6 +112,17 @@ class TextureStore:
         if key not in self._textures:
             self._textures[key] = self._scene.add_texture(name, data)
         return self._textures[key]
+
+    def _reading(self, value: AttributeValue) -> str:
+        """The scene's name for what is read of an attribute."""
+        reading = Reading(value.name, value.factor, value.affine)
+        for name, known in self.readings.items():
+            if known == reading:
+                return name
+        plain = value.affine == AttributeValue.affine and not value.factor
+        name = value.name if plain else f"{value.name} ({len(self.readings) + 1})"
+        self.readings[name] = reading
+        return name
 
     def json(self, value: Value, kind: Kind) -> Any:
         """A value as the ABI writes it, for a key that takes a number or a colour."""

@@ -25,6 +25,13 @@ class Source:
     socket: bpy.types.NodeSocket | None = None
     kinds: tuple[str, ...] = ()
 
+    @property
+    def key(self) -> tuple:
+        """Tells the output of a node in its groups from all others."""
+        assert self.node is not None and self.output is not None
+        groups = tuple(group.as_pointer() for group in self.stack)
+        return self.node.as_pointer(), self.output.identifier, groups
+
 
 def _same(
     sockets: bpy.types.NodeInputs | bpy.types.NodeOutputs, identifier: str

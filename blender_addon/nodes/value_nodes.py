@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 
 from . import operators
-from .coordinates import coordinates
+from .coordinates import coordinates, equirectangular
+from .curves import float_curve, rgb_curves
 from .tree import Stack, is_linked
 from .values import (
     KINDS,
@@ -21,6 +22,7 @@ from .values import (
     UnsupportedError,
     Value,
     convert,
+    pick,
 )
 
 if TYPE_CHECKING:
@@ -60,16 +62,17 @@ def _image(
         raise UnsupportedError("a texture of this kind in this place")
     if node.interpolation in {"Cubic", "Smart"}:
         ev.warn(node, f"{node.interpolation.lower()} interpolation", "linear is used")
+    straight = not environment and is_linked(node.outputs["Alpha"])
     texture_filter = "closest" if node.interpolation == "Closest" else "linear"
+    source = ev.textures.source(node.image, straight_alpha=straight)
+    if environment and place.point() is not None:
+        return pick(source, *equirectangular(place.point()), texture_filter)
     if environment:
         sampling = Sampling("environment", place.direction_matrix(), filter=texture_filter)
-        straight = False
     else:
         sampling = Sampling(
             "uv", place.uv_transform(), place.uv, _WRAP[node.extension], texture_filter
         )
-        straight = is_linked(node.outputs["Alpha"])
-    source = ev.textures.source(node.image, straight_alpha=straight)
     return ImageValue(source, sampling, "float" if alpha else "color", "a" if alpha else "rgb")
 
 
@@ -85,8 +88,9 @@ def _attribute(
         name = node.attribute_name
         if node.attribute_type != "GEOMETRY" or not name:
             raise UnsupportedError(f"an attribute of type {node.attribute_type.lower()}")
-    channel = {"Alpha": "a", "Fac": "average"}.get(output.identifier, "rgb")
-    return AttributeValue(name, KINDS[output.type], channel)
+    factor = output.identifier == "Fac"
+    channel = "a" if output.identifier == "Alpha" else "r" if factor else "rgb"
+    return AttributeValue(name, KINDS[output.type], channel, factor)
 
 
 def _math(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
@@ -222,10 +226,9 @@ def _separate(
     index = {"Red": 0, "Green": 1, "Blue": 2, "X": 0, "Y": 1, "Z": 2}[output.identifier]
     value = ev.value(node.inputs[0], stack)
     mode = getattr(node, "mode", "RGB")
-    if mode == "HSV":
-        return ev.combine(node, "float", lambda c: operators.rgb_to_hsv(c)[..., [index]], value)
     if mode != "RGB":
-        raise UnsupportedError(f"the {mode} model")
+        separate, _ = operators.COLOR_MODELS[mode]
+        return ev.combine(node, "float", lambda c: separate(c)[..., [index]], value)
     if not isinstance(value, Constant) and value.channel == "rgb":
         # A channel of an image costs nothing.
         kind: Kind = "float"
@@ -240,12 +243,10 @@ def _combine(
 ) -> Value:
     """Combine Color and Combine XYZ."""
     mode = getattr(node, "mode", "RGB")
-    if mode not in {"RGB", "HSV"}:
-        raise UnsupportedError(f"the {mode} model")
 
     def apply(*channels: np.ndarray) -> np.ndarray:
         result = np.concatenate(np.broadcast_arrays(*channels), axis=-1)
-        return operators.hsv_to_rgb(result) if mode == "HSV" else result
+        return result if mode == "RGB" else operators.COLOR_MODELS[mode][1](result)
 
     return ev.combine(node, KINDS[output.type], apply, *_all(ev, node, stack))
 
@@ -277,6 +278,8 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeMix": _mix,
     "ShaderNodeMixRGB": _mix,
     "ShaderNodeInvert": _invert,
+    "ShaderNodeRGBCurve": rgb_curves,
+    "ShaderNodeFloatCurve": float_curve,
     "ShaderNodeGamma": _simple(operators.gamma, "color", "Color", "Gamma"),
     "ShaderNodeBrightContrast": _simple(
         operators.bright_contrast, "color", "Color", "Bright", "Contrast"

@@ -27,6 +27,18 @@ KINDS: dict[str, Kind] = {
 _LUMINANCE = np.array([0.2126390, 0.7151687, 0.0721923], np.float32)
 
 
+_IDENTITY = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+# Readings of a mesh attribute by which arithmetic on it is judged: four of them fix an affine
+# function, and the others tell whether it is one, also beyond 0 and 1.
+_READINGS = np.array(
+    [
+        *([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]),
+        *([0.5, 0.25, 0.75], [-1, 0.5, 2], [3, -2, 0.1], [0.2, 4, -3], [-5, -4, -3], [6, 7, 8]),
+    ]
+)
+
+
 class UnsupportedError(Exception):
     """A combination of values that cannot be expressed; the text says which."""
 
@@ -38,6 +50,9 @@ class ImageSource(Protocol):
 
     def texels(self) -> np.ndarray:
         """(height, width, 4) float32, linear, row 0 on top."""
+
+    def least(self) -> float:
+        """The smallest number among the texels."""
 
 
 @dataclass(frozen=True)
@@ -92,11 +107,22 @@ class ImageValue:
 
 @dataclass(frozen=True)
 class AttributeValue:
-    """An attribute of the mesh, such as vertex colours."""
+    """An attribute of the mesh, such as vertex colours; with `factor` as one number.
+
+    How many components become that number, each mesh knows for itself. `affine`: the three rows of
+    a 3x4 matrix that is applied to what is read.
+    """
 
     name: str
     kind: Kind = "color"
     channel: str = "rgb"
+    factor: bool = False
+    affine: tuple[float, ...] = _IDENTITY
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """`affine` as an array of three rows."""
+        return np.array(self.affine).reshape(3, 4)
 
 
 Value = Constant | ImageValue | AttributeValue
@@ -118,6 +144,10 @@ class Baked:
         result = np.ones((height, width, 4), np.float32)
         result[..., :3] = self.values if channels == 3 else np.repeat(self.values, 3, axis=2)
         return result
+
+    def least(self) -> float:
+        """See `ImageSource`."""
+        return float(self.values.min())
 
 
 def convert(value: Value, kind: Kind) -> Value:
@@ -152,6 +182,11 @@ def array(value: Value) -> np.ndarray:
     texels = value.source.texels()
     if value.gain != 1.0:
         texels = texels * np.float32(value.gain)
+    return _channel(texels, value)
+
+
+def _channel(texels: np.ndarray, value: ImageValue | AttributeValue) -> np.ndarray:
+    """What a value takes of its texels."""
     if value.channel == "rgb":
         return texels[..., :3]
     if value.channel in "rgba":
@@ -173,11 +208,71 @@ def average(value: Value) -> Constant:
     return replace(Constant.color(mean), kind=value.kind)
 
 
+def pick(source: ImageSource, u: float, v: float, texture_filter: str) -> Constant:
+    """The colour of a repeated picture at one point, (0, 0) at the bottom left."""
+    texels = source.texels()[::-1, :, :3]
+    height, width = texels.shape[:2]
+    x, y = u * width, v * height
+    if texture_filter == "closest":
+        return Constant.color(texels[int(np.floor(y)) % height, int(np.floor(x)) % width])
+    x, y = x - 0.5, y - 0.5
+    left, bottom = int(np.floor(x)), int(np.floor(y))
+    columns, rows = [left % width, (left + 1) % width], [bottom % height, (bottom + 1) % height]
+    across, up = np.array([left + 1 - x, x - left]), np.array([bottom + 1 - y, y - bottom])
+    return Constant.color(np.einsum("y,x,yxc", up, across, texels[np.ix_(rows, columns)]))
+
+
+def negative(value: Value) -> bool:
+    """Whether a value is below 0 somewhere. Attributes of meshes are taken to be colours."""
+    if isinstance(value, Constant):
+        return min(value.rgb) < 0.0
+    if isinstance(value, AttributeValue):
+        return False
+    return value.gain < 0.0 or value.source.least() < 0.0
+
+
+def _affine(
+    kind: Kind, function: Callable[..., np.ndarray], values: tuple[Value, ...]
+) -> AttributeValue:
+    """Apply `function` to one attribute and constants, where that scales and shifts the attribute.
+
+    Only then is it the same whether the values are computed before their interpolation or after.
+    """
+    attributes = [value for value in values if isinstance(value, AttributeValue)]
+    first = attributes[0]
+    if any(
+        isinstance(value, ImageValue) or getattr(value, "channel", "") == "a" for value in values
+    ):
+        raise UnsupportedError("arithmetic on a mesh attribute")
+    if any((other.name, other.factor) != (first.name, first.factor) for other in attributes):
+        raise UnsupportedError("arithmetic on several mesh attributes")
+    readings = np.pad(_READINGS, ((0, 0), (0, 1)), constant_values=1.0)
+    with np.errstate(all="ignore"):
+        found = function(
+            *(
+                _channel((readings @ value.matrix.T)[None], value)
+                if isinstance(value, AttributeValue)
+                else array(value)
+                for value in values
+            )
+        )
+    found = np.broadcast_to(np.asarray(found, np.float64), (1, len(readings), 3))[0]
+    matrix = np.column_stack([*(found[1:4] - found[0]), found[0]])
+    if not np.allclose(readings @ matrix.T, found, rtol=1e-4, atol=1e-5):
+        raise UnsupportedError("arithmetic on a mesh attribute that does more than scale and shift")
+    channel = "r" if kind == "float" else "rgb"
+    return replace(
+        first, kind=kind, channel=channel, affine=tuple(float(entry) for entry in matrix.ravel())
+    )
+
+
 def combine(name: str, kind: Kind, function: Callable[..., np.ndarray], *values: Value) -> Value:
     """Apply `function` to the arrays of `values`: to one number, or to every texel.
 
     Images must be looked up alike and have one size, since no other image could hold the result.
     """
+    if any(isinstance(value, AttributeValue) for value in values):
+        return _affine(kind, function, values)
     images = [value for value in values if isinstance(value, ImageValue)]
     if any(image.sampling != images[0].sampling for image in images):
         raise UnsupportedError("images with different mappings")

@@ -81,6 +81,9 @@ class Scene:
         return {"warnings": [], "counts": {}}
 
 
+# What the statistics of every render warn about; cases put texts here.
+WARNINGS: list[str] = []
+
 SCENES: list[Scene] = []
 RENDERS: list[Render] = []
 
@@ -142,4 +145,5 @@ class Render:
             "non_finite": 0,
             "estimated_error": CURVE[-1]["estimated_error"] if CURVE else None,
             "curve": list(CURVE),
+            "warnings": list(WARNINGS),
         }

@@ -20,6 +20,7 @@ MODULES = {
     "geometry": "fake",
     "lights": "fake",
     "materials": "fake",
+    "nodes": "fake",
     "rendering": "real",
     "shared": "real",
     "world": "fake",

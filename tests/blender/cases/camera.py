@@ -116,3 +116,11 @@ def case_stereo_has_a_camera_for_each_eye() -> None:
     fake_segue.Scene.set_camera = record
     bpy.ops.render.render()
     assert len(seen) == 2 and abs(seen[1] - seen[0] - 0.065) < 1e-5, seen
+
+
+def case_an_empty_clipping_range_is_left_out() -> None:
+    camera = builders.camera(Matrix.Translation((0, 0, 5)), clip_start=20.0, clip_end=10.0)
+    scene, warnings = builders.export()
+    data = scene.camera[1]
+    assert data["near"] == 0.0 and data["far"] == 1e30
+    assert any(f"'{camera.name}'" in text and "clipping" in text for text in warnings), warnings

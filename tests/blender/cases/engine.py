@@ -260,3 +260,26 @@ def case_panels_of_blender_are_shared() -> None:
     ]
     blender_addon.register()
     assert not left, left
+
+
+def case_exposure_of_the_film() -> None:
+    """It brightens light, and neither alpha nor data; nor what the engine keeps."""
+    from blender_addon import job, passes
+
+    _prepare()
+    bpy.context.scene.cycles.film_exposure = 3.0
+    given = {}
+    original = job._read_passes
+
+    def read(render: fake_segue.Render, frame: job.Frame) -> dict[str, np.ndarray]:
+        given.update(original(render, frame))
+        return given
+
+    job._read_passes = read
+    picture = _rendered()
+    job._read_passes = original
+    np.testing.assert_array_equal(given["Combined"][0, :, 0], np.arange(64.0))
+    np.testing.assert_array_equal(picture[0, :, 0], 3.0 * np.arange(64.0))
+    np.testing.assert_array_equal(picture[..., 3], 1.0)
+    assert "Emission" in passes.LIGHT or "Emit" in passes.LIGHT
+    assert not passes.LIGHT & {"Depth", "Normal", "Albedo", "Position", "UV"}

@@ -176,3 +176,66 @@ def case_missing_engine_is_explained() -> None:
     else:
         raise AssertionError("a broken library was not noticed")
     fake_segue.Scene = original
+
+
+def case_what_the_engine_finds_while_rendering_is_told_once() -> None:
+    _prepare()
+    fake_segue.WARNINGS[:] = ['material "M": more than 10 lobes may meet in a point']
+    bpy.context.scene.render.use_motion_blur = True
+    _, warnings = builders.export()
+    fake_segue.WARNINGS.clear()
+    assert sum("10 lobes" in text for text in warnings) == 1, warnings
+    assert sum("Motion blur" in text for text in warnings) == 1, warnings
+
+
+def case_news_are_given_once() -> None:
+    from blender_addon.log import ExportLog
+
+    log = ExportLog()
+    log.warn("one")
+    assert log.news() == ["one"]
+    log.warn("one")
+    log.warn("two")
+    assert log.news() == ["two"] and log.news() == []
+
+
+def case_objects_nowhere_are_left_out() -> None:
+    _prepare()
+    builders.link(builders.cube(), "Lost", Matrix.Translation((float("nan"), 0, 0)))
+    builders.light("POINT", Matrix.Translation((0, float("nan"), 0)), name="Astray")
+    builders.light("POINT", name="Blinding", color=(1, 1, 1), energy=float("inf"))
+    scene, warnings = builders.export()
+    assert not scene.instances and not scene.lights
+    for name in ("Lost", "Astray", "Blinding"):
+        assert sum(f"'{name}'" in text for text in warnings) == 1, (name, warnings)
+
+
+def case_a_camera_nowhere_is_named() -> None:
+    builders.settings()
+    builders.camera(Matrix.Translation((float("nan"), 0, 5)))
+    _render_fails("camera 'Camera': its transform is not finite")
+
+
+def case_settings_of_cycles_that_are_left_out_are_named() -> None:
+    _prepare()
+    scene = bpy.context.scene
+    scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = False
+    scene.render.film_transparent = scene.cycles.film_transparent_glass = True
+    _, warnings = builders.export()
+    for text in ("reflective caustics", "refractive caustics", "Transparent glass"):
+        assert sum(text in warning for warning in warnings) == 1, (text, warnings)
+    scene.render.film_transparent = False
+    assert not any("Transparent glass" in text for text in builders.export()[1])
+
+
+def case_passes_of_cycles_that_are_left_out_are_named() -> None:
+    _prepare()
+    layer = bpy.context.view_layer
+    layer.aovs.add().name = "Mask"
+    layer.lightgroups.add(name="Key")
+    layer.cycles.denoising_store_passes = True
+    layer.cycles.pass_debug_sample_count = True
+    layer.cycles.use_pass_volume_direct = True
+    (text,) = builders.export()[1]
+    for name in ("AOV 'Mask'", "Light Group 'Key'", "Denoising Data", "Sample Count", "Volume"):
+        assert name in text, (name, text)

@@ -311,3 +311,73 @@ def case_large_meshes_are_quick() -> None:
     # Half a million triangles: bulk copies take a few hundredths of a second, a Python loop tens.
     assert time.monotonic() - start < 5.0
     assert scene.meshes[0]["face_indices"].size == 500 * 500 * 6
+
+
+def _attribute_material(name: str, output: str) -> bpy.types.Material:
+    entry, tree, target = builders.material()
+    reader = tree.nodes.new("ShaderNodeAttribute")
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    reader.attribute_name = name
+    tree.links.new(reader.outputs[output], diffuse.inputs["Color"])
+    tree.links.new(diffuse.outputs[0], target.inputs["Surface"])
+    return entry
+
+
+def _read_attribute(name: str, output: str, data: bpy.types.Mesh) -> tuple[str, dict]:
+    data.materials.clear()
+    data.materials.append(_attribute_material(name, output))
+    scene, warnings = builders.export()
+    assert not warnings, warnings
+    color = scene.materials[0][1]["surface"]["color"]
+    found = {
+        attribute.name: attribute
+        for attribute in scene.meshes[0]["attributes"]
+        if attribute.data.shape[1] != 2
+    }
+    return found[scene.textures[color["texture"]][1]["name"]]
+
+
+def case_uv_maps_as_colours() -> None:
+    data = builders.quad()
+    builders.link(data)
+    values = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    found = _read_attribute("UVMap", "Vector", data)
+    np.testing.assert_allclose(found.data, np.pad(values, ((0, 0), (0, 1))))
+    assert found.interpolation == "corner"
+    # As a factor Cycles takes the first of two components.
+    found = _read_attribute("UVMap", "Fac", data)
+    np.testing.assert_allclose(found.data, np.repeat(values[:, :1], 3, axis=1))
+
+
+def case_vectors_as_uv_maps() -> None:
+    data = builders.quad()
+    data.attributes.new("Place", "FLOAT_VECTOR", "POINT").data.foreach_set(
+        "vector", np.arange(12, dtype=np.float32)
+    )
+    entry, tree, output = builders.material()
+    reader, image = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeTexImage")
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    reader.attribute_name = "Place"
+    image.image = builders.image("Picture", np.ones((2, 2, 4), np.float32))
+    tree.links.new(reader.outputs["Vector"], image.inputs["Vector"])
+    tree.links.new(image.outputs["Color"], diffuse.inputs["Color"])
+    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    data.materials.append(entry)
+    builders.link(data)
+    scene, _ = builders.export()
+    found = {attribute.name: attribute for attribute in scene.meshes[0]["attributes"]}["Place"]
+    np.testing.assert_allclose(found.data, np.arange(12).reshape(4, 3)[:, :2])
+
+
+def case_attributes_of_edges() -> None:
+    data = builders.quad()
+    builders.link(data)
+    values = np.array([0.0, 1.0, 2.0, 4.0], np.float32)
+    data.attributes.new("Crease", "FLOAT", "EDGE").data.foreach_set("value", values)
+    found = _read_attribute("Crease", "Fac", data)
+    wanted = [
+        np.mean([values[edge.index] for edge in data.edges if point in edge.vertices])
+        for point in range(4)
+    ]
+    assert found.interpolation == "vertex"
+    np.testing.assert_allclose(found.data, np.repeat(np.array(wanted)[:, None], 3, axis=1))

@@ -156,3 +156,18 @@ def case_instanced_lights() -> None:
         empty.instance_type, empty.instance_collection = "COLLECTION", collection
     scene, _ = builders.export()
     assert sorted(_pose(data)[0, 3] for _, data in scene.lights) == [0.0, 1.0, 2.0]
+
+
+def case_what_lights_ask_for_in_vain_is_named() -> None:
+    stretched = Matrix.Diagonal((2, 1, 1, 1))
+    builders.light("SPOT", stretched, name="Stretched", shadow_soft_size=0.1)
+    builders.light("SPOT", Matrix.Scale(2, 4), name="Even", shadow_soft_size=0.1)
+    builders.light("POINT", name="Balloon", shadow_soft_size=2.0)
+    hard = builders.light("POINT", name="Hard", shadow_soft_size=2.0)
+    hard.data.use_soft_falloff = False
+    short = builders.light("SUN", name="Short")
+    short.data.cycles.max_bounces = 3
+    _, warnings = builders.export()
+    for name, word in (("Stretched", "scale"), ("Balloon", "soft falloff"), ("Short", "bounces")):
+        assert sum(f"'{name}'" in text and word in text for text in warnings) == 1, warnings
+    assert len(warnings) == 3, warnings

@@ -152,3 +152,91 @@ def case_up_is_up() -> None:
     dome, _, _ = _dome()
     pose = Matrix(np.array(dome["transform"]).reshape(4, 4).tolist())
     assert (pose.to_3x3() @ Vector((0, 1, 0)) - Vector((0, 0, 1))).length < 1e-6
+
+
+def case_odd_strengths_are_clamped_and_named() -> None:
+    _, _, node = builders.world()
+    node.inputs["Color"].default_value = (0.5, 0.25, 0.0, 1)
+    node.inputs["Strength"].default_value = -1.0
+    dome, _, warnings = _dome()
+    assert dome is None
+    assert any("World 'World': negative light" in text for text in warnings), warnings
+    node.inputs["Strength"].default_value = float("nan")
+    dome, _, warnings = _dome()
+    assert dome is None
+    assert any("'Strength'" in text and "not finite" in text for text in warnings), warnings
+
+
+def case_negative_texels_are_named() -> None:
+    _environment((0, 0, 0))
+    assert not _dome()[2]
+    image = bpy.data.images["Sky"]
+    image.pixels[0] = -1.0
+    dome, _, warnings = _dome()
+    assert "image" in dome
+    assert any("negative light" in text for text in warnings), warnings
+
+
+def case_colour_in_the_place_of_a_shader() -> None:
+    _, tree, _ = builders.world()
+    color = tree.nodes.new("ShaderNodeRGB")
+    color.outputs[0].default_value = (0.25, 0.5, 0.75, 1)
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputWorld")
+    tree.links.new(color.outputs[0], output.inputs[0])
+    dome, _, warnings = _dome()
+    assert dome["radiance"] == [0.25, 0.5, 0.75] and not warnings, warnings
+
+
+def case_mapping_of_nothing_is_a_constant_direction() -> None:
+    pixels = _environment((0, 0, 0))
+    tree = bpy.context.scene.world.node_tree
+    nodes = {node.bl_idname: node for node in tree.nodes}
+    mapping, image = nodes["ShaderNodeMapping"], nodes["ShaderNodeTexEnvironment"]
+    tree.links.remove(mapping.inputs["Vector"].links[0])
+    image.interpolation = "Closest"
+    for direction in ((0, 0, 0), (1, 2, 0.5), (-1, -0.5, -3)):
+        mapping.inputs["Location"].default_value = direction
+        dome, _, warnings = _dome()
+        length = np.linalg.norm(direction)
+        u, v = _blender_coordinates(np.array(direction) / length) if length else (0.0, 0.0)
+        wanted = pixels[::-1][int(v * 4), int(u * 8), :3]
+        np.testing.assert_allclose(dome["radiance"], wanted, err_msg=str(direction))
+        assert "image" not in dome and not warnings, warnings
+    # Between four texels, across the edges of the picture: its mean columns and rows.
+    image.interpolation = "Linear"
+    mapping.inputs["Location"].default_value = (0, 0, 0)
+    np.testing.assert_allclose(_dome()[0]["radiance"], (3.5, 1.5, 1.0))
+
+
+def case_branches_that_are_shared_are_read_once() -> None:
+    """Forty mixes of a background with itself would be a billion backgrounds otherwise."""
+    _, tree, background = builders.world()
+    background.inputs["Color"].default_value = (0.5, 0.25, 0.125, 1)
+    source = background.outputs[0]
+    for _ in range(40):
+        mix = tree.nodes.new("ShaderNodeMixShader")
+        tree.links.new(source, mix.inputs[1])
+        tree.links.new(source, mix.inputs[2])
+        source = mix.outputs[0]
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputWorld")
+    tree.links.new(source, output.inputs[0])
+    np.testing.assert_allclose(_dome()[0]["radiance"], (0.5, 0.25, 0.125))
+
+
+def case_rays_that_should_not_see_the_world_are_named() -> None:
+    data, _, _ = builders.world()
+    data.cycles_visibility.diffuse = data.cycles_visibility.scatter = False
+    data.cycles.max_bounces = 4
+    _, _, warnings = _dome()
+    assert any("'World'" in text and "diffuse, volume scatter" in text for text in warnings)
+    assert any("'World'" in text and "bounces" in text for text in warnings), warnings
+
+
+def case_the_background_in_the_emission_pass_is_named() -> None:
+    builders.world()
+    layer = bpy.context.view_layer
+    assert not _dome()[2]
+    layer.use_pass_emit = True
+    assert any("Emission pass" in text for text in _dome()[2])
+    bpy.context.scene.render.film_transparent = True
+    assert not _dome()[2]

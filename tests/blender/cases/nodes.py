@@ -1,0 +1,237 @@
+"""Nodes: shared branches, textures and their places, curves, and values that make no sense."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+import builders
+from cases.materials import Tree, _close
+
+
+def case_branches_that_are_shared_are_translated_once() -> None:
+    """Forty mixes of a shader with itself are that shader."""
+    tree = Tree()
+    source = tree.node("BsdfDiffuse", Color=(0.1, 0.2, 0.3, 1))
+    for _ in range(40):
+        mix = tree.node("MixShader")
+        tree.link(source.outputs[0], mix.inputs[1])
+        tree.link(source.outputs[0], mix.inputs[2])
+        source = mix
+    tree.surface(source)
+    surface, _, warnings = tree.export()
+    assert surface["type"] == "diffuse" and not warnings
+    _close(surface["color"], (0.1, 0.2, 0.3))
+
+
+def case_surfaces_that_double_with_every_node_end() -> None:
+    tree = Tree()
+    glow = tree.node("Emission")
+    source = tree.node("BsdfDiffuse")
+    for _ in range(30):
+        add, mix = tree.node("AddShader"), tree.node("MixShader")
+        tree.link(source.outputs[0], add.inputs[0])
+        tree.link(glow.outputs[0], add.inputs[1])
+        tree.link(source.outputs[0], mix.inputs[1])
+        tree.link(add.outputs[0], mix.inputs[2])
+        source = mix
+    tree.surface(source)
+
+    def count(closure: dict) -> int:
+        if closure["type"] not in {"mix", "add"}:
+            return 1
+        return count(closure["a"]) + count(closure["b"])
+
+    surface, _, warnings = tree.export()
+    assert 100 < count(surface) <= 256
+    assert any("more than 256 shaders" in text for text in warnings), warnings
+
+
+def case_channels_of_data_are_not_multiplied_by_alpha() -> None:
+    pixels = np.full((2, 2, 4), 0.5, np.float32)
+    pixels[0, :, 3] = 0.0
+    pixels[1, :, 3] = 0.25
+    for is_float in (False, True):
+        for alpha_used in (False, True):
+            tree = Tree()
+            image = tree.node("TexImage")
+            image.image = builders.image("Data", pixels, "Non-Color", is_float=is_float)
+            shader = tree.surface(tree.node("BsdfPrincipled"))
+            tree.link(image.outputs["Color"], shader.inputs["Base Color"])
+            if alpha_used:
+                tree.link(image.outputs["Alpha"], shader.inputs["Alpha"])
+            _, scene, _ = tree.export()
+            found = scene.images[0]["pixels"][..., :3]
+            np.testing.assert_allclose(found, 0.5 if is_float else 128)
+            bpy.data.objects.remove(tree.item)
+            bpy.data.materials.remove(tree.material)
+
+
+def _lookup(tree: Tree, node: bpy.types.Node) -> np.ndarray:
+    """Where the corners of the unit square are looked up by an image behind `node`."""
+    image = tree.node("TexImage")
+    image.image = builders.image("Picture", np.ones((2, 2, 4), np.float32))
+    shader = tree.surface(tree.node("BsdfDiffuse"))
+    tree.link(image.outputs["Color"], shader.inputs["Color"])
+    tree.link(node.outputs[0], image.inputs["Vector"])
+    surface, scene, warnings = tree.export()
+    assert not warnings, warnings
+    matrix = np.array(scene.textures[surface["color"]["texture"]][1]["transform"]).reshape(2, 3)
+    corners = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
+    return corners @ matrix.T
+
+
+def case_coordinates_from_nothing_are_constant() -> None:
+    tree = Tree()
+    mapping = tree.node("Mapping", Location=(0.25, 0.5, 0), Scale=(3, 3, 3))
+    _close(_lookup(tree, mapping), [(0.25, 0.5)] * 3)
+    maths = tree.node("VectorMath")
+    maths.inputs[0].default_value, maths.inputs[1].default_value = (0.25, 0.5, 0), (0.5, 0.25, 0)
+    _close(_lookup(tree, maths), [(0.75, 0.75)] * 3)
+    # What only passes on nothing is as if it were not there.
+    _close(_lookup(tree, tree.tree.nodes.new("NodeReroute")), [(0, 0), (1, 0), (0, 1)])
+    muted = tree.node("Mapping", Scale=(3, 3, 3))
+    muted.mute = True
+    _close(_lookup(tree, muted), [(0, 0), (1, 0), (0, 1)])
+    # The input of a group has a value of its own.
+    group = bpy.data.node_groups.new("Passage", "ShaderNodeTree")
+    group.interface.new_socket("In", in_out="INPUT", socket_type="NodeSocketVector")
+    group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketVector")
+    start, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    group.links.new(start.outputs[0], end.inputs[0])
+    passage = tree.node("Group")
+    passage.node_tree = group
+    passage.inputs[0].default_value = (0.5, 0.75, 0)
+    _close(_lookup(tree, passage), [(0.5, 0.75)] * 3)
+
+
+def case_negative_emission_is_named() -> None:
+    tree = Tree()
+    for kind, name in (("Emission", "Strength"), ("BsdfPrincipled", "Emission Strength")):
+        node = tree.surface(tree.node(kind))
+        for strength, named in ((-0.2, True), (2.0, False), (0.0, False)):
+            node.inputs[name].default_value = strength
+            _, _, warnings = tree.export()
+            assert any("negative emission" in text for text in warnings) == named, warnings
+
+
+def case_negative_texels_that_emit_are_named() -> None:
+    tree = Tree()
+    image, node = tree.node("TexImage"), tree.surface(tree.node("Emission"))
+    tree.link(image.outputs["Color"], node.inputs["Color"])
+    for least, strength, named in ((-1, 1, True), (-1, 0, False), (0, 1, False), (0, -1, True)):
+        pixels = np.ones((2, 2, 4), np.float32)
+        pixels[0, 0, 0] = least
+        image.image = builders.image("Glow", pixels, "Non-Color", is_float=True)
+        node.inputs["Strength"].default_value = strength
+        _, _, warnings = tree.export()
+        assert any("negative emission" in text for text in warnings) == named, (least, strength)
+
+
+def case_numbers_that_are_not_finite_are_named() -> None:
+    tree = Tree()
+    node = tree.surface(tree.node("BsdfDiffuse"))
+    node.inputs["Color"].default_value = (0.5, float("nan"), 0.5, 1)
+    surface, _, warnings = tree.export()
+    assert surface["color"] == [0.0, 0.0, 0.0]
+    assert any("'Tested'" in text and "'Color'" in text for text in warnings), warnings
+
+
+def case_single_scattering_is_named() -> None:
+    tree = Tree()
+    for kind, inputs, named in (
+        ("BsdfAnisotropic", {"Roughness": 0.6}, True),
+        ("BsdfAnisotropic", {"Roughness": 0.1}, False),
+        ("BsdfGlass", {"Roughness": 0.6}, True),
+        ("BsdfRefraction", {"Roughness": 0.6}, False),
+        ("BsdfPrincipled", {"Roughness": 0.6}, False),
+        ("BsdfPrincipled", {"Roughness": 0.6, "Metallic": 1.0}, True),
+        ("BsdfPrincipled", {"Roughness": 0.6, "Transmission_Weight": 1.0}, True),
+    ):
+        node = tree.surface(tree.node(kind, **inputs))
+        node.distribution = "GGX"
+        _, _, warnings = tree.export()
+        found = any("scatters once" in text for text in warnings)
+        assert found == named, (kind, inputs, warnings)
+
+
+def case_opaque_shadows_are_named() -> None:
+    tree = Tree()
+    tree.material.use_transparent_shadow = False
+    tree.surface(tree.node("BsdfDiffuse"))
+    assert not tree.export()[2]
+    tree.surface(tree.node("BsdfPrincipled", Alpha=0.5))
+    assert any("opaque shadows" in text for text in tree.export()[2])
+
+
+def case_curves() -> None:
+    tree = Tree()
+    shader = tree.surface(tree.node("BsdfDiffuse"))
+    curves = tree.node("RGBCurve", Fac=0.5, Color=(0.5, 0.25, 1.5, 1))
+    # The combined curve halves, the red one inverts.
+    curves.mapping.curves[3].points[1].location = (1, 0.5)
+    curves.mapping.curves[0].points[0].location = (0, 1)
+    curves.mapping.curves[0].points[1].location = (1, 0)
+    tree.link(curves.outputs[0], shader.inputs["Color"])
+    curved = np.array((0.75, 0.125, 0.75))
+    surface, _, warnings = tree.export()
+    np.testing.assert_allclose(
+        surface["color"], (curved + np.array((0.5, 0.25, 1.5))) / 2, atol=2e-3
+    )
+    curves.mapping.extend = "HORIZONTAL"
+    surface, _, _ = tree.export()
+    np.testing.assert_allclose(surface["color"][2], (0.5 + 1.5) / 2, atol=2e-3)
+    curve = tree.node("FloatCurve", Value=0.5)
+    curve.mapping.curves[0].points[1].location = (1, 0.5)
+    tree.link(curve.outputs[0], shader.inputs["Roughness"])
+    surface, _, more = tree.export()
+    np.testing.assert_allclose(surface["roughness"], 0.25, atol=2e-3)
+    assert not warnings and not more
+
+
+def case_the_hsl_model() -> None:
+    from mathutils import Color
+
+    rng = np.random.default_rng(2)
+    tree = Tree()
+    shader = tree.surface(tree.node("BsdfDiffuse"))
+    separate, combine = tree.node("SeparateColor"), tree.node("CombineColor")
+    for rgb in (*rng.uniform(size=(8, 3)), (0, 0, 0), (1, 1, 1), (0.5, 0.5, 0.5), (1, 0, 0)):
+        separate.mode = "HSL"
+        combine.mode = "RGB"
+        separate.inputs[0].default_value = (*rgb, 1)
+        for i in range(3):
+            tree.link(separate.outputs[i], combine.inputs[i])
+        tree.link(combine.outputs[0], shader.inputs["Color"])
+        surface, _, warnings = tree.export()
+        high, low = max(rgb), min(rgb)
+        lightness = (high + low) / 2
+        saturation = (high - low) / (1 - abs(2 * lightness - 1)) if high > low else 0.0
+        wanted = (Color(rgb).h, saturation, lightness)
+        np.testing.assert_allclose(surface["color"], wanted, rtol=1e-4, atol=1e-5)
+        combine.mode = "HSL"
+        _close(tree.export()[0]["color"], rgb)
+        assert not warnings
+
+
+def case_arithmetic_on_vertex_colours() -> None:
+    tree = Tree()
+    values = np.random.default_rng(3).uniform(size=(4, 4)).astype(np.float32)
+    paint = tree.item.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+    paint.data.foreach_set("color", values.ravel())
+    reader = tree.node("VertexColor")
+    reader.layer_name = "Paint"
+    tint = tree.node("MixRGB", Fac=0.5, Color2=(0.5, 0.25, 1, 1))
+    tint.blend_type = "MULTIPLY"
+    shader = tree.surface(tree.node("BsdfDiffuse"))
+    tree.link(reader.outputs["Color"], tint.inputs["Color1"])
+    tree.link(tint.outputs["Color"], shader.inputs["Color"])
+    surface, scene, warnings = tree.export()
+    assert not warnings, warnings
+    name = scene.textures[surface["color"]["texture"]][1]["name"]
+    found = {attribute.name: attribute for attribute in scene.meshes[0]["attributes"]}
+    _close(found[name].data[:, :3], values[:, :3] * (0.75, 0.625, 1.0))
+    # What is done before or after the interpolation must be the same.
+    tint.use_clamp = True
+    _, _, warnings = tree.export()
+    assert any("more than scale and shift" in text for text in warnings), warnings
