@@ -103,7 +103,7 @@ def sun_through_glass(full: bool) -> Rows:
         )
         s.camera([0, -0.8, 0.8], [0, 0, 0], 0.3)
         expected = (1 - reflectance) / (1 + reflectance)
-        got = s.means(32, 512 if full else 192, 6, **SHARP)
+        got = s.means(32, 512 if full else 320, 6, **SHARP)
         yield row(f"{degrees:g} degrees", expected, got, 0.01 if full else 0.02)
 
 
