@@ -38,13 +38,16 @@ pub struct Cluster {
     pub class: SurfaceClass,
 }
 
+/// Number of no arrival.
+const NOBODY: u32 = u32::MAX;
+
 /// The piece of a surface that a cluster is; of use until its areas are known.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
-    /// First arrival of each part of its voxel.
+    /// First arrival of each part of its voxel; [`NOBODY`] where there is none.
     firsts: [u32; MOST_PARTS],
-    /// How many there are, and which of them it is in.
-    divided: (u8, u8),
+    /// The part that it is in.
+    part: u8,
     /// Clusters that share that part at random, itself included.
     sharing: u32,
 }
@@ -302,8 +305,8 @@ impl Layout {
     fn add(&mut self, group: &[(u64, u32)], (parts, count): (&[u8], usize), class: SurfaceClass) {
         let members =
             |part| group.iter().zip(parts).filter(move |p| usize::from(*p.1) == part).map(|(&(_, i), _)| i);
-        let mut firsts = [u32::MAX; MOST_PARTS];
-        (0..count).for_each(|part| firsts[part] = members(part).next().unwrap_or(u32::MAX));
+        let mut firsts = [NOBODY; MOST_PARTS];
+        (0..count).for_each(|part| firsts[part] = members(part).next().unwrap_or(NOBODY));
         for part in 0..count {
             let total = members(part).count() as u32;
             let from_camera = members(part).take_while(|&i| i < self.cameras).count() as u32;
@@ -329,7 +332,7 @@ impl Layout {
                     inverse_area: 0.0,
                     class,
                 });
-                self.pieces.push(Piece { firsts, divided: (count as u8, part as u8), sharing });
+                self.pieces.push(Piece { firsts, part: part as u8, sharing });
             }
         }
     }
@@ -344,7 +347,8 @@ fn measure(
     (c, piece): (&mut Cluster, &Piece),
     areas: Areas,
 ) -> u64 {
-    let (count, part) = (usize::from(piece.divided.0), usize::from(piece.divided.1));
+    let part = usize::from(piece.part);
+    let firsts = piece.firsts.iter().filter(|&&i| i != NOBODY);
     let representative = all.get(piece.firsts[part]);
     let voxel = grid.voxel(representative.position);
     let sharing = piece.sharing as f32;
@@ -353,8 +357,8 @@ fn measure(
     if areas == Areas::None {
         return 0;
     }
-    let cell = Cell { grid, voxel, representative: &representative, is_divided: count > 1 };
-    let division = Division::new(world, grid, piece.firsts[..count].iter().map(|&i| all.place(i)));
+    let cell = Cell { grid, voxel, representative: &representative, is_divided: piece.firsts[1] != NOBODY };
+    let division = Division::new(world, grid, firsts.map(|&i| all.place(i)));
     let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.triangle(i)));
     let mut probes = 0;
     let mut estimate = |points: u32| {
