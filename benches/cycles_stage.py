@@ -7,23 +7,17 @@ cycles_stage.py STAGE WIDTH SECONDS THREADS GUIDED OUT
 from __future__ import annotations
 
 import json
-import resource
 import runpy
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
+from processor import processor_seconds
 
 BOUNCES = 64
 #: Samples a pixel of the render that tells how many fit into the time.
 TRIAL = 8
-
-
-def processor_seconds() -> float:
-    """Of this process."""
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    return used.ru_utime + used.ru_stime
 
 
 def main(

@@ -10,24 +10,18 @@ differ in plastics alone: the source lets light bounce below their surface, whic
 from __future__ import annotations
 
 import json
-import resource
 import sys
 import types
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from processor import processor_seconds
 
 #: Samples a pixel of one call.
 STEP = 4
 #: Bounces, and one for the light.
 DEPTH = 65
-
-
-def processor_seconds() -> float:
-    """Of this process."""
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    return used.ru_utime + used.ru_stime
 
 
 def previewed(bsdf: Any) -> Any:
