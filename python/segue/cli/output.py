@@ -34,32 +34,39 @@ def files(path: Path) -> list[Path]:
     return [path.with_suffix(".exr"), path] if path.suffix.lower() == ".png" else [path]
 
 
-def check_path(path: Path) -> None:
+def check_path(*paths: Path) -> None:
     """Refuses what cannot be written, before anything is rendered.
 
     Raises:
         UsageError: the suffix is unknown, or the folder does not exist.
-        OutputError: the file is a folder, or its folder takes no files.
+        OutputError: a file is a folder, or its folder takes no files.
     """
-    if path.suffix.lower() not in (".exr", ".png"):
-        raise UsageError(f"{path}: the output has to be an .exr or a .png")
-    if not path.parent.is_dir():
-        raise UsageError(f"{path}: the folder {path.parent} does not exist")
-    for file in files(path):
-        check_file(file)
+    for path in paths:
+        if path.suffix.lower() not in (".exr", ".png"):
+            raise UsageError(f"{path}: the output has to be an .exr or a .png")
+        if not path.parent.is_dir():
+            raise UsageError(f"{path}: the folder {path.parent} does not exist")
+    check_files(*(file for path in paths for file in files(path)))
 
 
-def check_file(path: Path) -> None:
-    """Refuses a file that cannot be written.
+def check_files(*paths: Path) -> None:
+    """Refuses files that cannot be written. Each folder is tried once, however many go there.
 
     Raises:
-        OutputError: it is a folder, or its folder takes no files.
+        OutputError: one is a folder, or its folder takes no files.
     """
-    if path.is_dir():
-        raise OutputError(f"{path} cannot be written: it is a folder")
+    for path in paths:
+        if path.is_dir():
+            raise OutputError(f"{path} cannot be written: it is a folder")
+    for folder, path in {path.parent: path for path in reversed(paths)}.items():
+        _try(folder, path)
+
+
+def _try(folder: Path, path: Path) -> None:
+    """Refuses `path` if its folder takes no files."""
     try:
         # Permissions do not tell: what holds for a user need not hold for a file system.
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".segue-"):
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=".segue-"):
             pass
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}") from None

@@ -114,18 +114,18 @@ def run(options: argparse.Namespace) -> Status:
     if options.stats is not None:
         if not options.stats.parent.is_dir():
             raise UsageError(f"{options.stats}: the folder {options.stats.parent} does not exist")
-        output.check_file(options.stats)
+        output.check_files(options.stats)
     reference = images.read_rgb(options.reference) if options.reference else None
     frames = [options.frame]
     if options.frames is not None:
         first, last = options.frames
         frames = [float(f) for f in range(first, last + 1)]
-    for frame in frames:
-        output.check_path(output.frame_path(options.output, frame, len(frames) > 1))
+    many = len(frames) > 1
+    output.check_path(*(output.frame_path(options.output, frame, many) for frame in frames))
     collected = []
     with Cancellation() as cancellation:
         for frame in frames:
-            stats = _render_frame(options, frame, len(frames) > 1, reference, cancellation)
+            stats = _render_frame(options, frame, many, reference, cancellation)
             if stats is not None:
                 collected.append(stats)
             if cancellation.requested:
