@@ -62,20 +62,6 @@ fn render_tile(context: &Context, index: u32, shared: &SharedTile) -> bool {
     complete
 }
 
-/// The state of the walk along one path.
-struct Throughput {
-    /// Product of BSDF values over densities, for basic radiance.
-    weight: Vec3,
-    /// Product of `1 / eta^2` over refractions: basic radiance to radiance.
-    basic_to_radiance: f32,
-}
-
-impl Throughput {
-    fn radiance(&self) -> Vec3 {
-        self.weight * self.basic_to_radiance
-    }
-}
-
 /// Where the last direction came from, for the weight of light that is hit by it.
 #[derive(Clone, Copy)]
 enum Origin {
@@ -113,7 +99,8 @@ impl PathWalk<'_, '_> {
     fn trace(&mut self, camera: &CameraRay, sample: &mut Sample) {
         let context = self.context;
         let world = context.world;
-        let mut throughput = Throughput { weight: Vec3::ONE, basic_to_radiance: 1.0 };
+        // factor on basic radiance
+        let mut throughput = Vec3::ONE;
         let mut origin = Origin::Delta;
         let mut piece = Piece::from_camera(camera);
         for depth in 0.. {
@@ -124,17 +111,17 @@ impl PathWalk<'_, '_> {
                 self.rays += 1;
                 let hit = world.closest(&piece, from_camera);
                 world.for_each_light_on(&piece, hit.as_ref(), from_camera, |light| {
-                    found += throughput.radiance() * light.radiance * self.hit_weight(origin, light);
+                    found += throughput * light.radiance * self.hit_weight(origin, light);
                 });
                 let Some(hit) = hit else { break None };
                 let choice = if world.needs().transparency { self.sampler.next_1d() } else { 0.0 };
                 match world.shade(&hit, -piece.direction, choice) {
                     Shaded::Through { weight } => {
-                        throughput.weight *= weight;
+                        throughput *= weight;
                         piece = piece.beyond(&hit);
                     }
                     Shaded::Scatters { weight, vertex, .. } => {
-                        throughput.weight *= weight;
+                        throughput *= weight;
                         break Some((hit, vertex));
                     }
                 }
@@ -142,19 +129,19 @@ impl PathWalk<'_, '_> {
             let Some((hit, vertex)) = end else {
                 world.for_each_infinite_light(&piece, from_camera, |light| {
                     if !(from_camera && context.transparent_background) {
-                        found += throughput.radiance() * light.radiance * self.hit_weight(origin, light);
+                        found += throughput * light.radiance * self.hit_weight(origin, light);
                     }
                 });
                 record(sample, depth, found);
                 if from_camera && context.transparent_background {
-                    sample.alpha = 1.0 - throughput.weight.element_sum() / 3.0;
+                    sample.alpha = 1.0 - throughput.element_sum() / 3.0;
                 }
                 return;
             };
             if vertex.emission != Vec3::ZERO {
                 let light = world.emitter_at(&piece, &hit, vertex.emission);
                 let weight = light.map_or(1.0, |light| self.hit_weight(origin, light));
-                found += throughput.radiance() * vertex.emission * weight;
+                found += throughput * vertex.emission * weight;
             }
             record(sample, depth, found);
             if from_camera {
@@ -169,12 +156,11 @@ impl PathWalk<'_, '_> {
             let receiver = hit.receiver(bsdf, wo);
             let Some(sight) = bsdf.sight(wo, Among::All) else { return };
             if bsdf.has_smooth() {
-                let direct = self.next_event(&hit, &receiver, &sight) * throughput.radiance();
+                let direct = self.next_event(&hit, &receiver, &sight) * throughput;
                 record(sample, depth + 1, direct);
             }
             let Some(s) = sight.sample(Walk::Camera, self.sampler.next_3d()) else { return };
-            throughput.weight *= s.weight();
-            throughput.basic_to_radiance /= s.eta * s.eta;
+            throughput *= s.weight();
             origin = match s.pdf {
                 Density::Discrete(_) => Origin::Delta,
                 Density::Projected(pdf) => {
@@ -183,13 +169,12 @@ impl PathWalk<'_, '_> {
             };
             let u = self.sampler.next_1d();
             if depth >= ROULETTE_FROM {
-                // by basic radiance: a path inside glass is not worth less than outside
                 let ceiling = if depth >= ROULETTE_ALWAYS_FROM { MAX_SURVIVAL } else { 1.0 };
-                let survival = throughput.weight.max_element().min(ceiling);
+                let survival = throughput.max_element().min(ceiling);
                 if u >= survival {
                     return;
                 }
-                throughput.weight /= survival;
+                throughput /= survival;
             }
             piece = Piece::leaving(&hit, s.direction);
         }
@@ -220,10 +205,6 @@ impl PathWalk<'_, '_> {
             true => 1.0,
             false => power_heuristic(light.pdf, pdf.0 * cos),
         };
-        // the light's radiance is basic radiance once divided by the squared index of its own side
-        let to_radiance = sight.relative_index(light.direction).powi(-2);
-        f * light.radiance
-            * (weight * to_radiance / light.pdf)
-            * world.transmittance(hit, &light, &mut self.rays)
+        f * light.radiance * (weight / light.pdf) * world.transmittance(hit, &light, &mut self.rays)
     }
 }

@@ -124,10 +124,8 @@ impl Pier {
     /// Value of a light walk from `wo` to `w`. Layers depend on the side of the camera.
     fn value(&self, s: Sampled, a: &Arrival, w: Vec3) -> Vec3 {
         match a.class {
-            SurfaceClass::Diffuse => self.bsdf.eval_flux(a.wo, w),
-            SurfaceClass::Reflecting | SurfaceClass::Transmitting => {
-                s.world.bsdf(&self.hit, w).eval_flux(a.wo, w)
-            }
+            SurfaceClass::Diffuse => self.bsdf.eval(w, a.wo),
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => s.world.bsdf(&self.hit, w).eval(w, a.wo),
         }
     }
 }

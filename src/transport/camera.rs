@@ -110,8 +110,7 @@ impl Seeing<'_> {
         if self.sampler.max_depth.is_some_and(|most| chain.passages > most) {
             return;
         }
-        let scale = 1.0 / (chain.forward * chain.index * chain.index);
-        let light = chain.throughput * radiance * scale;
+        let light = chain.throughput * radiance / chain.forward;
         self.primary.light += light;
         match chain.passages {
             0 => self.primary.emission += light,
@@ -165,8 +164,6 @@ struct Meeting<'a> {
     receiver: Receiver,
     /// Cosine of the direction in which it left.
     cos: f32,
-    /// `1 / n^2` where it begins.
-    inverse_n2: f32,
     guide: &'a EmissionGuide,
     /// Light paths times the probability that one ends at the arrival.
     light_paths: f32,
@@ -175,8 +172,7 @@ struct Meeting<'a> {
 
 impl Meeting<'_> {
     fn add(&mut self, chain: &Chain, radiance: Vec3, next_event_pdf: f32, emission_pdf: f32) {
-        let squeeze = 1.0 / (chain.index * chain.index);
-        let light = chain.throughput * radiance * (self.inverse_n2 * squeeze);
+        let light = chain.throughput * radiance;
         if !light.is_finite() {
             *self.dropped += 1;
             return;
@@ -186,7 +182,7 @@ impl Meeting<'_> {
             light,
             forward: chain.forward,
             next_event_pdf,
-            light_density: self.light_paths * emission_pdf * chain.reverse * squeeze,
+            light_density: self.light_paths * emission_pdf * chain.reverse * chain.squeeze,
             passages: chain.passages,
         });
     }
@@ -229,7 +225,6 @@ impl CameraSampler<'_> {
         let place = &end.hit.place;
         primary.density =
             chain.forward * place.normal.dot(end.wo).abs() * self.sensor.density(ray, place.position);
-        let mut inverse_n2 = 1.0 / (chain.index * chain.index);
         let mut own = OwnPath::new(chain.passages, self.max_depth);
         let follow = Follow { world: self.world, walk: Walk::Camera, from_camera: false };
         let mut met = Vec::new();
@@ -248,7 +243,7 @@ impl CameraSampler<'_> {
             let receiver = end.hit.receiver(&end.vertex.bsdf, end.wo);
             let (next_event, value) = match (self.next_event, &sight) {
                 (true, Some(sight)) => {
-                    let drawn = self.next_event(&end, sight, &receiver, inverse_n2, sampler, rays);
+                    let drawn = self.next_event(&end, sight, &receiver, sampler, rays);
                     drawn.unwrap_or_default()
                 }
                 _ => Default::default(),
@@ -263,11 +258,10 @@ impl CameraSampler<'_> {
             arrived.goes_on = sample.is_some();
             let survival = arrived.survival;
             let Some(sample) = sample else {
-                store.push(arrived, inverse_n2, next_event, Outgoing::default());
+                store.push(arrived, next_event, Outgoing::default());
                 break;
             };
             let direction = sample.direction;
-            let start_n2 = inverse_n2 / (sample.eta * sample.eta);
             let light_end = end.probability_from(self.world, direction);
             let mut meeting = Meeting {
                 world: self.world,
@@ -276,7 +270,6 @@ impl CameraSampler<'_> {
                 arrival: index as u32,
                 receiver,
                 cos: end.hit.place.normal.dot(direction).abs(),
-                inverse_n2: start_n2,
                 guide: self.guide,
                 light_paths: self.light_paths * light_end,
                 next_event: self.next_event,
@@ -287,22 +280,20 @@ impl CameraSampler<'_> {
             own.meet(&met, sample.value, density);
             met.drain(..).for_each(|hit| store.hits.push(hit));
             own.go_on(&chain, sample.value, density);
-            let squeeze = 1.0 / (chain.index * chain.index);
             let outgoing = Outgoing {
                 direction,
                 pdf: sample.pdf.value(),
                 throughput: chain.throughput,
                 forward: if next.is_some() { chain.forward } else { 0.0 },
                 reverse: chain.reverse * light_end,
-                squeeze,
+                squeeze: chain.squeeze,
                 passages: chain.passages,
             };
-            store.push(arrived, inverse_n2, next_event, outgoing);
+            store.push(arrived, next_event, outgoing);
             match next {
                 Some(e) => end = e,
                 None => break,
             }
-            inverse_n2 = start_n2 * squeeze;
         }
         primary.unfiltered = own.light;
         (primary, first_hit)
@@ -331,7 +322,6 @@ impl CameraSampler<'_> {
         end: &End,
         sight: &Sight,
         receiver: &Receiver,
-        inverse_n2: f32,
         sampler: &mut Sampler,
         rays: &mut u64,
     ) -> Option<(NextEvent, Vec3)> {
@@ -348,8 +338,7 @@ impl CameraSampler<'_> {
         if visible == Vec3::ZERO || light.radiance == Vec3::ZERO {
             return None;
         }
-        let index = sight.relative_index(light.direction);
-        let arriving = light.radiance * visible * (inverse_n2 / (index * index));
+        let arriving = light.radiance * visible;
         let paths = match self.light_paths > 0.0 {
             true => {
                 let ends = end.probability_from(self.world, light.direction);

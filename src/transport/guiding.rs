@@ -147,7 +147,7 @@ pub(super) fn worth_of_arrivals(o: Outcome, spread: impl Fn(&Cluster) -> f32 + S
                 if o.max_depth.is_some_and(|most| bounces >= most) {
                     break;
                 }
-                worth[i - first] = SharedExponent::encode(along * s.camera.inverse_n2(i));
+                worth[i - first] = SharedExponent::encode(along);
                 if !has_end(s, i) {
                     break;
                 }

@@ -1,8 +1,8 @@
-//! Sequential sampling from the lights.
+//! Sequential sampling from the lights. They emit basic radiance: a lamp inside of glass is as bright as one outside.
 
 use super::Estimator;
 use super::arrival::arrival;
-use super::store::{Carry, LightStart, LightStore, Photon, Rivals};
+use super::store::{LightStart, LightStore, Photon, Rivals};
 use super::walk::{Chain, End, Follow, Nobody};
 use crate::math::Sampler;
 use crate::shading::bsdf::Walk;
@@ -31,11 +31,11 @@ impl LightSampler<'_> {
         let follow = Follow { world: self.world, walk: Walk::Light, from_camera: false };
         let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
         let Some(mut end) = end else { return };
-        let mut flux = ray.flux / self.paths * (chain.throughput / chain.forward);
+        let mut flux = ray.flux / self.paths * chain.flux_factor();
         let mut rivals = self.first(&ray, &chain, &end);
         let mut camera_choices = chain.reverse;
         let mut bounces = chain.passages;
-        let mut carry = Carry { throughput: chain.throughput, inverse_n2: 1.0 / (chain.index * chain.index) };
+        let mut carried = chain.throughput;
         let start = LightStart { draw: ray.draw, first: store.arrivals.len() as u32 };
         if flux.is_finite() && flux.max_element() > 0.0 {
             store.starts.push(start);
@@ -49,7 +49,7 @@ impl LightSampler<'_> {
             arrived.goes_on = sample.is_some();
             store.arrivals.push(arrived);
             if self.estimator == Estimator::Literal {
-                store.carries.push(carry);
+                store.carries.push(carried);
             }
             let (direction, pdf) = sample.map_or((Vec3::ZERO, 0.0), |s| (s.direction, s.pdf.value()));
             // the camera segment that gathers it is as opaque at its end
@@ -60,18 +60,17 @@ impl LightSampler<'_> {
             let value = match arrived.class {
                 SurfaceClass::Diffuse => sample.value,
                 // layers depend on the side of the camera, which is known only now
-                _ => self.world.bsdf(&end.hit, direction).eval_flux(end.wo, direction),
+                _ => self.world.bsdf(&end.hit, direction).eval(direction, end.wo),
             };
             flux *= value / (pdf * arrived.survival);
             let camera_end = end.probability_from(self.world, direction);
             let piece = Piece::leaving(&end.hit, direction);
             let (chain, next) = follow.segment(piece, sampler, &mut Nobody, rays);
             let Some(next) = next else { return };
-            flux *= chain.throughput / chain.forward;
-            rivals = Rivals::Later { light_choices: chain.forward, squeeze: chain.index * chain.index };
+            flux *= chain.flux_factor();
+            rivals = Rivals::Later { light_choices: chain.forward, squeeze: 1.0 / chain.squeeze };
             camera_choices = chain.reverse * camera_end;
-            let index = sample.eta * chain.index;
-            carry = Carry { throughput: chain.throughput, inverse_n2: carry.inverse_n2 / (index * index) };
+            carried = chain.throughput;
             bounces += 1 + chain.passages;
             end = next;
         }
@@ -91,7 +90,7 @@ impl LightSampler<'_> {
         let across = match ray.density {
             SourceDensity::Extended(pdf) => {
                 return Rivals::First {
-                    light_density: self.paths * pdf.0 * chain.forward * chain.index * chain.index,
+                    light_density: self.paths * pdf.0 * chain.forward / chain.squeeze,
                     next_event_pdf: if unbroken { next_event_pdf() / cos } else { 0.0 },
                     is_delta: false,
                 };

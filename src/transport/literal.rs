@@ -89,10 +89,10 @@ struct LightSegment {
 fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
     let n = s.camera.arrivals.len();
     let one = |j: usize| {
-        let (photon, carry) = (s.light.photons.get(j), &s.light.carries[j]);
+        let photon = s.light.photons.get(j);
         let Rivals::Later { light_choices, squeeze } = photon.rivals else {
             return LightSegment {
-                emitted: photon_value(s, w, j) * (s.cluster_of(n + j).area * carry.inverse_n2),
+                emitted: photon_value(s, w, j) * s.cluster_of(n + j).area,
                 carry: Vec3::ZERO,
                 passages: photon.bounces,
             };
@@ -102,7 +102,7 @@ fn photon_segments(s: Sampled, w: &Weights) -> Vec<LightSegment> {
         let camera = photon.camera_choices * w.densities[n + j].camera;
         LightSegment {
             emitted: Vec3::ZERO,
-            carry: carry.throughput * reciprocal(light + camera),
+            carry: s.light.carries[j] * reciprocal(light + camera),
             passages: photon.bounces.saturating_sub(s.light.photons.bounces(before) + 1),
         }
     };
@@ -154,11 +154,9 @@ impl Recursion<'_> {
                     let (to_camera, to_light) = w.row(k, s.row(i, c)).split_at(c.cameras as usize);
                     let cameras: Vec3 =
                         to_camera.iter().zip(s.cameras(c)).map(|(f, i)| f.decode() * values[i]).sum();
-                    // the row holds f (n_o / n_i)^2, and radiance is basic
-                    let lights = to_light.iter().zip(s.lights(c)).map(|(f, j)| {
-                        f.decode() * values[n + j] * (self.inverse_n2(i) / s.light.carries[j].inverse_n2)
-                    });
-                    (cameras + lights.sum::<Vec3>()) / c.area
+                    let lights: Vec3 =
+                        to_light.iter().zip(s.lights(c)).map(|(f, j)| f.decode() * values[n + j]).sum();
+                    (cameras + lights) / c.area
                 }
             };
             w.direct(i) + gathered
@@ -169,19 +167,5 @@ impl Recursion<'_> {
     fn reflectance(&self, i: usize) -> Vec3 {
         let n = self.s.camera.arrivals.len();
         if i < n { self.s.camera.arrivals.reflectance(i) } else { self.s.light.arrivals.reflectance(i - n) }
-    }
-
-    /// `1 / n^2` on the side to which arrival `i` reflects.
-    fn inverse_n2(&self, i: usize) -> f32 {
-        let n = self.s.camera.arrivals.len();
-        if i < n {
-            return self.s.camera.inverse_n2(i);
-        }
-        // where the path goes on, seen from its next arrival
-        let next = (i - n + 1 < self.s.light.photons.len()).then(|| self.s.light.photons.get(i - n + 1));
-        match next.map(|next| next.rivals) {
-            Some(Rivals::Later { squeeze, .. }) => self.s.light.carries[i - n + 1].inverse_n2 * squeeze,
-            _ => self.s.light.carries[i - n].inverse_n2,
-        }
     }
 }

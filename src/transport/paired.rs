@@ -85,12 +85,12 @@ pub(super) fn weigh(s: Sampled, c: &Cluster, estimator: Estimator, places: &mut 
             let w = member.arrival.wo;
             let (pdf, value) = look(w);
             densities[n + column].camera += pdf;
-            values[row * width + n + column] = value / bsdf.relative_index(*wo, w).powi(2);
+            values[row * width + n + column] = value;
         }
         for (column, b) in bridges.clone().enumerate() {
             let (pdf, value) = look(b.direction);
             bridge_pdfs[column] += pdf;
-            values[row * width + n + m + column] = value / bsdf.relative_index(*wo, b.direction).powi(2);
+            values[row * width + n + m + column] = value;
         }
     }
     if estimator == Estimator::LeaveOneOut {

@@ -175,7 +175,7 @@ pub(super) fn gather_photons(
             let all = Others { chance: bridges.chances[k], number: c.lights as f32 };
             sum += carry(0.0, all) * over_bridges;
         }
-        SharedExponent::encode(sum * s.camera.inverse_n2(i))
+        SharedExponent::encode(sum)
     })
 }
 

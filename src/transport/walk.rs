@@ -18,21 +18,25 @@ const SURVIVAL: f32 = 0.95;
 /// What has been collected along a generalised segment.
 #[derive(Clone, Copy, Debug)]
 pub struct Chain {
-    /// Product of the coefficients of the Dirac lobes and of stochastic visibility: factor on basic radiance
-    /// (camera) or flux (light).
+    /// Product of the coefficients of the Dirac lobes and of stochastic visibility: factor on basic radiance.
     pub throughput: Vec3,
     /// Probability of the choices made: `c` of this walk.
     pub forward: f32,
     /// Probability of the same choices for the walk the other way.
     pub reverse: f32,
-    /// Refractive index here over that where the segment began.
-    pub index: f32,
+    /// `(n_start / n_here)^2`: étendue densities here become densities where the segment began.
+    pub squeeze: f32,
     /// Dirac lobes passed.
     pub passages: u32,
 }
 
 impl Chain {
-    const START: Self = Self { throughput: Vec3::ONE, forward: 1.0, reverse: 1.0, index: 1.0, passages: 0 };
+    const START: Self = Self { throughput: Vec3::ONE, forward: 1.0, reverse: 1.0, squeeze: 1.0, passages: 0 };
+
+    /// Factor on the flux of a light walk: it keeps its étendue, of which flux is counted per `dA dw_perp`.
+    pub fn flux_factor(&self) -> Vec3 {
+        self.throughput * (self.squeeze / self.forward)
+    }
 }
 
 /// Where a generalised segment ends: a surface with a continuous lobe.
@@ -146,7 +150,7 @@ impl Follow<'_> {
                     chain.throughput *= passage.coefficient;
                     chain.forward *= passage.forward;
                     chain.reverse *= passage.reverse;
-                    chain.index *= passage.eta;
+                    chain.squeeze /= passage.eta * passage.eta;
                     chain.passages += 1;
                     if chain.passages > ROULETTE_FROM {
                         if sampler.next_1d() >= SURVIVAL {

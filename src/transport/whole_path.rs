@@ -261,7 +261,7 @@ impl WholePaths<'_> {
             return;
         }
         let near = self.joined_near(i, at);
-        let scale = c.inverse_area * s.camera.inverse_n2(i);
+        let scale = c.inverse_area;
         let mut photon = |j: usize, value: Vec3| {
             found(j, value * s.light.photons.flux(j) * (self.join_weight(j, at, near) * scale));
         };

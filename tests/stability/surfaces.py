@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from case import Rows, beside, case, row
-from stage import DIFFUSE, SHARP, Stage
+from stage import DIFFUSE, SHARP, Stage, icosphere
 
 GROUP = "Surfaces"
 
@@ -36,6 +36,35 @@ def indices(full: bool) -> Rows:
         for r in (0.0, 0.3) if full else (0.0,):
             got = ball({"type": "glass", "ior": ior, "roughness": r}).means(20, 48, 6, **SHARP)
             yield row(f"index {ior:.7g}, roughness {r:g}", 1.0, got, 0.01)
+
+
+@case(GROUP, "0.75: emission over what is absorbed")
+def immersed(full: bool) -> Rows:
+    """A glowing furnace through a single sheet of glass, from inside of glass, and with its lamps inside of glass."""
+    glowing = {"type": "emission", "color": [1, 1, 1], "strength": 0.3}
+    wall = {"type": "add", "a": glowing, "b": {"type": "diffuse", "color": 0.6}}
+
+    def room(place: str, r: float) -> Stage:
+        s = Stage()
+        s.mesh(*icosphere(3), wall)
+        glass = {"type": "glass", "ior": 1.5, "roughness": r}
+        if place == "a sheet":
+            s.mesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [0, 1, 2, 0, 2, 3], glass)
+        if place == "camera in glass":
+            s.ball(glass, [0, -0.6, 0], 0.25)
+        if place == "lamp in glass":
+            s.ball(wall, [0, 0.2, 0], 0.2)
+            s.ball(glass, [0, 0.2, 0], 0.4)
+        s.camera([0, -0.6, 0], [0, 0.2, 0], 0.4)
+        return s
+
+    methods = ("segment", "mvf", "path", "bdpt", "vcm") if full else ("segment", "path")
+    for place in ("a sheet", "camera in glass", "lamp in glass"):
+        for r in (0.0, 0.3):
+            for method in methods:
+                kernel = {} if method in ("path", "bdpt") else SHARP
+                got = room(place, r).means(20, 64, 6, integrator=method, **kernel)
+                yield row(f"{place}, roughness {r:g}, {method}", 0.75, got, 0.01)
 
 
 @case(GROUP, "the room without the ball")

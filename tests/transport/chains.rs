@@ -26,7 +26,7 @@ fn prism(s: &mut Stage, seed: u32, low: f32, material: u32) {
 }
 
 /// Where the ray that starts at `x` with direction `p` (both along z = 3) ends, in canonical coordinates, and what
-/// happened on the way: index and number of passages.
+/// happened on the way: squeeze and number of passages.
 fn end(world: &World, x: [f64; 4], seed: u32) -> Option<(DVec4, (u32, u32))> {
     let [x, y, px, py] = x.map(|v| v as f32);
     let direction = Vec3::new(px, py, -(1.0 - px * px - py * py).sqrt());
@@ -35,9 +35,9 @@ fn end(world: &World, x: [f64; 4], seed: u32) -> Option<(DVec4, (u32, u32))> {
     let end = end?;
     let n = end.hit.place.normal;
     let along = Vec2::new(end.hit.place.position.x, end.hit.place.position.y).as_dvec2();
-    let slope = -end.wo.truncate().as_dvec2() * f64::from(chain.index);
+    let slope = -end.wo.truncate().as_dvec2() * f64::from(chain.squeeze.sqrt().recip());
     assert!((n.z.abs() - 1.0).abs() < 1e-6, "the screen is level");
-    Some((DVec4::new(along.x, along.y, slope.x, slope.y), (chain.index.to_bits(), chain.passages)))
+    Some((DVec4::new(along.x, along.y, slope.x, slope.y), (chain.squeeze.to_bits(), chain.passages)))
 }
 
 #[test]

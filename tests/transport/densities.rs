@@ -10,7 +10,7 @@ use segue::transport::Estimator;
 use segue::transport::arrival::arrival;
 use segue::transport::cluster::{Areas, Clusters, Numbered};
 use segue::transport::grid::Grid;
-use segue::transport::store::{Arrival, CameraStore, Carry, LightStore, NextEvent, Outgoing, Photon, Rivals};
+use segue::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing, Photon, Rivals};
 use segue::transport::walk::End;
 use segue::transport::weigh::{Sampled, Weights};
 use std::f64::consts::PI;
@@ -60,7 +60,7 @@ fn go_on(a: &mut Arrival, end: &End, walk: Walk, sampler: &mut Sampler) -> Optio
 fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64 {
     let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
     let push = |store: &mut CameraStore, a: Arrival, out: Outgoing| {
-        store.push(a, 1.0, NextEvent::default(), out);
+        store.push(a, NextEvent::default(), out);
     };
     for k in 0..paths {
         let mut sampler = Sampler::new(seed, 1, k);
@@ -101,8 +101,7 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
             light.photons.push(Photon { bounces: 1, rivals, ..photon });
         }
     }
-    let carry = Carry { throughput: Vec3::ONE, inverse_n2: 1.0 };
-    light.carries.resize(light.photons.len(), carry);
+    light.carries.resize(light.photons.len(), Vec3::ONE);
     let sensor = sensor(footprint);
     let grid = Grid::new(&sensor, 1.0, seed);
     let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
@@ -159,7 +158,7 @@ fn densities_integrate_to_the_number_of_paths_that_go_on() {
             for k in 0..3000 {
                 let mut sampler = Sampler::new(seed, 3, k);
                 let a = on_plate(&world, false, &mut sampler).0;
-                camera.push(a, 1.0, NextEvent::default(), Outgoing::default());
+                camera.push(a, NextEvent::default(), Outgoing::default());
                 let mut probe = on_plate(&world, false, &mut sampler).0;
                 let d = warp::uniform_sphere(sampler.next_2d());
                 probe.wo = d.with_z(d.z.abs());

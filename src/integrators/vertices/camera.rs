@@ -31,8 +31,6 @@ struct Tip {
     end: End,
     /// Factor on the basic radiance that is reflected there.
     weight: Vec3,
-    /// `1 / n^2` on the side arrived from, the camera being in a medium of index one.
-    inverse_n2: f32,
     /// Times that light which is emitted there will have been scattered.
     bounces: u32,
     survival: f32,
@@ -52,7 +50,6 @@ impl CameraSampler<'_> {
         let follow = Follow { from_camera: false, ..follow };
         let mut tip = Tip {
             weight: chain.throughput / chain.forward,
-            inverse_n2: 1.0 / (chain.index * chain.index),
             bounces: chain.passages,
             survival: survival_at(rules.world, &end),
             sum: self.first(ray, &chain, &end),
@@ -82,13 +79,12 @@ impl CameraSampler<'_> {
             let Some(s) = vertex.bsdf.sample_continuous(tip.end.wo, Walk::Camera, u) else { return sample };
             let left = vertex.leaving(rules, Walk::Camera, s.direction);
             let weight = tip.weight * s.value / (s.pdf.value() * tip.survival);
-            let inverse_n2 = tip.inverse_n2 / (s.eta * s.eta);
             let mut meeting = Meeting {
                 rules,
                 receiver: vertex.hit.receiver(vertex.bsdf, vertex.wo),
                 cos: left.cos,
                 turn: left.turn,
-                weight: weight * inverse_n2,
+                weight,
                 bounces: tip.bounces + 1,
                 sample: &mut sample,
             };
@@ -97,7 +93,6 @@ impl CameraSampler<'_> {
             let Some(end) = end else { return sample };
             tip = Tip {
                 weight: weight * chain.throughput / chain.forward,
-                inverse_n2: inverse_n2 / (chain.index * chain.index),
                 bounces: tip.bounces + 1 + chain.passages,
                 survival: survival_at(rules.world, &end),
                 sum: after(rules, &left.turn, &chain, tip.end.hit.place.position, left.cos, &end),
@@ -145,7 +140,7 @@ impl CameraSampler<'_> {
         };
         let weight = mis::next_event(&left.turn, drawn, emitted, light.is_delta);
         let arriving = light.radiance * visible * (left.cos * weight / light.pdf);
-        record(sample, tip.bounces + 1, tip.factor(vertex, light.direction) * left.value * arriving);
+        record(sample, tip.bounces + 1, tip.weight * left.value * arriving);
     }
 
     /// Light that a vertex of a light path sends here.
@@ -174,7 +169,7 @@ impl CameraSampler<'_> {
             let g = here.cos * there.cos / square;
             let arriving = light.flux * there.value * visible;
             let weight = mis::connection(&there.turn, &here.turn, g);
-            record(sample, bounces, tip.factor(vertex, direction) * here.value * arriving * (g * weight));
+            record(sample, bounces, tip.weight * here.value * arriving * (g * weight));
         });
     }
 
@@ -200,7 +195,7 @@ impl CameraSampler<'_> {
             // photons are as dense as their own facet is turned to the light, which under smoothed normals is
             // not what the BSDF reckons with here; the surface's opacity is in both sub-paths
             let arriving = light.flux * (weight * left.cos / (light.cos * light.opacity * eta));
-            record(sample, bounces, tip.factor(vertex, light.wo) * left.value * arriving);
+            record(sample, bounces, tip.weight * left.value * arriving);
         });
     }
 }
@@ -209,11 +204,6 @@ impl Tip {
     fn vertex(&self) -> Vertex<'_> {
         let End { hit, vertex, wo, .. } = &self.end;
         Vertex { hit, bsdf: &vertex.bsdf, wo: *wo, survival: self.survival, sum: self.sum }
-    }
-
-    /// Factor on the BSDF times radiance, not basic, that arrives from a direction.
-    fn factor(&self, vertex: &Vertex, direction: Vec3) -> Vec3 {
-        self.weight * (self.inverse_n2 / vertex.bsdf.relative_index(vertex.wo, direction).powi(2))
     }
 }
 
@@ -238,8 +228,7 @@ impl Witness for Seeing<'_, '_> {
 
     fn glow(&mut self, chain: &Chain, radiance: Vec3) {
         if chain.passages <= self.camera.rules.max_depth {
-            let scale = 1.0 / (chain.forward * chain.index * chain.index);
-            record(self.sample, chain.passages, chain.throughput * radiance * scale);
+            record(self.sample, chain.passages, chain.throughput * radiance / chain.forward);
         }
     }
 
@@ -263,7 +252,7 @@ struct Meeting<'a, 'b> {
     /// Cosine of the direction in which it left.
     cos: f32,
     turn: Turn,
-    /// Factor on radiance where the segment begins.
+    /// Factor on basic radiance where the segment begins.
     weight: Vec3,
     /// Bounces of light that is met there.
     bounces: u32,
@@ -274,9 +263,12 @@ impl Meeting<'_, '_> {
     fn add(&mut self, chain: &Chain, radiance: Vec3, drawn: f32, emitted: f32) {
         let bounces = self.bounces + chain.passages;
         if bounces <= self.rules.max_depth {
-            let scale = 1.0 / (chain.forward * chain.index * chain.index);
             let weight = mis::meeting(&self.turn, chain, drawn, emitted);
-            record(self.sample, bounces, self.weight * chain.throughput * radiance * (scale * weight));
+            record(
+                self.sample,
+                bounces,
+                self.weight * chain.throughput * radiance * (weight / chain.forward),
+            );
         }
     }
 }

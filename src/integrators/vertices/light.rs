@@ -76,7 +76,7 @@ fn vertices(
     let follow = Follow { world, walk: Walk::Light, from_camera: false };
     let (chain, end) = follow.segment(ray.piece, sampler, &mut Nobody, rays);
     let Some(mut end) = end else { return };
-    let mut flux = ray.flux * (chain.throughput / chain.forward);
+    let mut flux = ray.flux * chain.flux_factor();
     let mut sum = first(rules, &ray, &chain, &end);
     let mut bounces = chain.passages;
     while bounces < rules.max_depth && flux.max_element() > 0.0 {
@@ -122,7 +122,7 @@ fn vertices(
         let piece = Piece::leaving(hit, sample.direction);
         let (chain, next) = follow.segment(piece, sampler, &mut Nobody, rays);
         let Some(next) = next else { return };
-        flux *= chain.throughput / chain.forward;
+        flux *= chain.flux_factor();
         if rules.weighs() {
             sum = after(rules, &left.turn, &chain, from, from_cos, &next);
         }

@@ -52,9 +52,8 @@ impl Sum {
     /// while next-event estimation would have `drawn` it; both per area of the vertex for delta lights, which
     /// camera paths cannot meet.
     pub fn from_light(chain: &Chain, emitted: f32, drawn: f32, is_delta: bool, merged: f32) -> Self {
-        let squeeze = 1.0 / (chain.index * chain.index);
         let made = emitted * chain.forward;
-        let slope = if is_delta { 0.0 } else { chain.reverse * squeeze / made };
+        let slope = if is_delta { 0.0 } else { chain.reverse * chain.squeeze / made };
         Self { fixed: merged + drawn / made, slope }
     }
 
@@ -68,11 +67,10 @@ impl Sum {
     /// After one more segment. `connected`: the density `P G` of its end if a connection along it is a
     /// technique. `merged`: `eta` of its end.
     pub fn after(turn: &Turn, chain: &Chain, connected: Option<f32>, merged: f32) -> Self {
-        let squeeze = 1.0 / (chain.index * chain.index);
         let made = turn.onward * chain.forward;
         Self {
             fixed: merged + connected.map_or(0.0, f32::recip),
-            slope: chain.reverse * turn.end_back * squeeze * turn.sum / made,
+            slope: chain.reverse * turn.end_back * chain.squeeze * turn.sum / made,
         }
     }
 }
@@ -110,8 +108,7 @@ pub fn next_event(camera: &Turn, drawn: f32, emitted: f32, is_delta: bool) -> f3
 /// Weight of a light that a camera path met; densities as in [`next_event`], along the segment's chain.
 #[inline]
 pub fn meeting(camera: &Turn, chain: &Chain, drawn: f32, emitted: f32) -> f32 {
-    let squeeze = 1.0 / (chain.index * chain.index);
-    let light = emitted * chain.reverse * squeeze * camera.end_back * camera.sum;
+    let light = emitted * chain.reverse * chain.squeeze * camera.end_back * camera.sum;
     weight(1.0 + (drawn + light) / (camera.onward * chain.forward))
 }
 
@@ -133,7 +130,7 @@ mod tests {
         n: usize,
         light: Vec<Chain>,
         camera: Vec<Chain>,
-        /// Geometry terms towards the camera; towards the light they are over the squared ratio of indices.
+        /// Geometry terms towards the camera; towards the light they are over the squared ratio of squeezes.
         geometry: Vec<f32>,
         /// Densities with which light and camera paths are scattered on at each vertex.
         onward: [Vec<f32>; 2],
@@ -161,20 +158,24 @@ mod tests {
             let mut ends = [numbers(0.2, 1.0), numbers(0.2, 1.0)];
             // what is emitted is met before anything is chosen
             ends[1][0] = 1.0;
-            let (choices, indices, broken) = (numbers(0.2, 1.0), numbers(0.5, 2.0), numbers(0.1, 10.0));
+            let (choices, squeezes, broken) = (numbers(0.2, 1.0), numbers(0.5, 2.0), numbers(0.1, 10.0));
             let reverse_choices = numbers(0.2, 1.0);
             let (mut light, mut camera) = (Vec::new(), Vec::new());
             for k in 0..=n {
                 let passages = if broken[k] > 2.0 { 1 } else { 0 };
-                let (forward, reverse, index) = match passages {
+                let (forward, reverse, squeeze) = match passages {
                     0 => (1.0, 1.0, 1.0),
-                    _ => (choices[k], reverse_choices[k], indices[k]),
+                    _ => (choices[k], reverse_choices[k], squeezes[k]),
                 };
-                let one = Chain { throughput: Vec3::ONE, forward, reverse, index, passages };
+                let one = Chain { throughput: Vec3::ONE, forward, reverse, squeeze, passages };
                 light.push(Chain { forward: forward * ends[0][k], ..one });
                 let before = k.saturating_sub(1);
-                let back =
-                    Chain { forward: reverse * ends[1][before], reverse: forward, index: 1.0 / index, ..one };
+                let back = Chain {
+                    forward: reverse * ends[1][before],
+                    reverse: forward,
+                    squeeze: 1.0 / squeeze,
+                    ..one
+                };
                 camera.push(back);
             }
             let [emitted, drawn, seen] = [0; 3].map(|_| random(0.1, 5.0));
@@ -201,7 +202,7 @@ mod tests {
         }
 
         fn back_geometry(&self, k: usize) -> f32 {
-            self.geometry[k] / self.light[k].index.powi(2)
+            self.geometry[k] * self.light[k].squeeze
         }
 
         /// Density of vertices `0..=k` made from the light.

@@ -77,7 +77,7 @@ pub struct Vertex<'a> {
 /// A direction in which a vertex is left.
 #[derive(Clone, Copy, Debug)]
 pub struct Leaving {
-    /// Camera: `eval(wo, direction)`. Light: `eval_flux(wo, direction)`.
+    /// Camera: `eval(wo, direction)`. Light: `eval(direction, wo)`.
     pub value: Vec3,
     /// Absolute cosine to the geometric normal.
     pub cos: f32,
@@ -108,7 +108,7 @@ impl Vertex<'_> {
         let back = back();
         let value = match walk {
             Walk::Camera => bsdf.eval(wo, direction),
-            Walk::Light => back.eval_flux(wo, direction),
+            Walk::Light => back.eval(direction, wo),
         };
         if !rules.weighs() || value == Vec3::ZERO {
             return Leaving { value, cos, turn: Turn::default() };

@@ -19,7 +19,7 @@ pub struct BsdfBuilder {
 impl BsdfBuilder {
     /// No lobes yet. `ng`: unit geometric normal, pointing out of the object.
     pub fn new(ng: Vec3) -> Self {
-        Self { bsdf: Bsdf { ng, eta: 1.0, entries: SmallVec::new() }, dropped: 0 }
+        Self { bsdf: Bsdf { ng, entries: SmallVec::new() }, dropped: 0 }
     }
 
     /// Adds a lobe. The normal of `frame` is the shading normal; it is turned to the side of the
@@ -68,15 +68,7 @@ impl BsdfBuilder {
     }
 
     /// The sum of what was pushed.
-    pub fn build(mut self) -> Bsdf {
-        let (mut most, mut eta) = (0.0, 1.0);
-        for e in self.bsdf.entries() {
-            let weight = e.weight.element_sum();
-            if matches!(e.lobe, Lobe::Dielectric(_)) && !e.delta && weight > most {
-                (most, eta) = (weight, e.lobe.eta());
-            }
-        }
-        self.bsdf.eta = eta;
+    pub fn build(self) -> Bsdf {
         self.bsdf
     }
 }

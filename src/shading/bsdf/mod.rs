@@ -31,7 +31,7 @@ use smallvec::SmallVec;
 pub enum Walk {
     /// From the camera: the known direction is `wo`, and radiance is carried.
     Camera,
-    /// From a light: the known direction is `wi`, and flux is carried.
+    /// From a light: the known direction is `wi`, and flux per unit of étendue's `dA dw_perp` is carried.
     Light,
 }
 
@@ -40,13 +40,13 @@ pub enum Walk {
 pub struct BsdfSample {
     /// The drawn direction, unit length.
     pub direction: Vec3,
-    /// Camera walk: `eval(from, direction)`. Light walk: `eval(direction, from) n_to^2 / n_from^2`. For a
-    /// delta event the coefficient of the Dirac delta. Divided by the density it is the factor on the
-    /// basic radiance, or the flux, that the path carries.
+    /// Camera walk: `eval(from, direction)`. Light walk: `eval(direction, from)`. For a delta event the
+    /// coefficient of the Dirac delta of étendue. Divided by the density it is the factor on the basic radiance
+    /// that the path carries.
     pub value: Vec3,
     /// How likely the draw was, about the geometric normal. Never zero.
     pub pdf: Density,
-    /// Refractive index of the sampled side over that of the side come from; 1 for a reflection.
+    /// Refractive index, by the drawn lobe, of the sampled side over that of the side come from; 1 for a reflection.
     pub eta: f32,
     /// What happened.
     pub kind: Kind,
@@ -100,9 +100,6 @@ impl Entry {
 #[derive(Clone, Debug)]
 pub struct Bsdf {
     ng: Vec3,
-    /// Refractive index below the surface over that above it, for what continuous lobes transmit: that
-    /// of the refracting lobe of most weight.
-    eta: f32,
     /// Few surfaces have more than two, and this is copied often.
     entries: SmallVec<[Entry; 2]>,
 }
@@ -158,20 +155,6 @@ impl Bsdf {
         &self.entries
     }
 
-    /// Refractive index on the side of `to` over that on the side of `from`, for light that a continuous
-    /// lobe scatters between them.
-    #[inline]
-    pub fn relative_index(&self, from: Vec3, to: Vec3) -> f32 {
-        let (from, to) = (self.ng.dot(from), self.ng.dot(to));
-        if from * to > 0.0 {
-            1.0
-        } else if from > 0.0 {
-            self.eta
-        } else {
-            1.0 / self.eta
-        }
-    }
-
     /// The two geometric sides as signs, or `None` for a direction in the tangent plane.
     #[inline]
     fn sides(&self, a: Vec3, b: Vec3) -> Option<(f32, f32, f32)> {
@@ -200,17 +183,6 @@ impl Bsdf {
             (Some(i), Some(o)) => e.weight * e.lobe.eval(o, i) * i.z.abs(),
             _ => Vec3::ZERO,
         }
-    }
-
-    /// Effective BSDF for light arriving from `from` and leaving along `to`, times `n_to^2 / n_from^2`:
-    /// the value of a light walk.
-    pub fn eval_flux(&self, from: Vec3, to: Vec3) -> Vec3 {
-        let Some((st, sf, cos)) = self.sides(to, from) else { return Vec3::ZERO };
-        let mut sum = Vec3::ZERO;
-        for e in self.entries() {
-            sum += self.eval_entry(e, to, st, from, sf);
-        }
-        sum * (self.relative_index(from, to).powi(2) / cos)
     }
 
     /// Density with which [`Bsdf::sample`], standing on `from`, draws `to` from the continuous lobes.

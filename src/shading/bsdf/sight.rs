@@ -62,11 +62,6 @@ impl Sight<'_> {
         (value / cos, ProjectedPdf(pdf / cos))
     }
 
-    /// [`Bsdf::relative_index`] towards `to`.
-    pub fn relative_index(&self, to: Vec3) -> f32 {
-        self.bsdf.relative_index(self.from, to)
-    }
-
     /// Density of drawing `to` from the continuous lobes.
     pub fn pdf(&self, to: Vec3) -> ProjectedPdf {
         let Some(side) = self.bsdf.side_of(to) else { return ProjectedPdf(0.0) };
@@ -107,7 +102,7 @@ impl Sight<'_> {
         if cos_to * side_to < MIN_COS {
             return None;
         }
-        let (value, pdf, eta) = match (e.delta, walk) {
+        let (value, pdf) = match (e.delta, walk) {
             (true, _) => {
                 let turn = match walk {
                     Walk::Camera => 1.0,
@@ -115,19 +110,16 @@ impl Sight<'_> {
                     Walk::Light => (local.z * cos_to / (bsdf.ng.dot(from) * s.direction.z)).abs(),
                 };
                 let choice = DiscreteProbability(self.choice.probability(k));
-                (e.weight * s.value * turn, s.pdf * choice, s.eta)
+                (e.weight * s.value * turn, s.pdf * choice)
             }
             (false, Walk::Camera) => {
                 let (value, pdf) = self.look(direction);
-                (value, Density::Projected(pdf), self.relative_index(direction))
+                (value, Density::Projected(pdf))
             }
-            (false, Walk::Light) => {
-                let value = bsdf.eval_flux(from, direction);
-                (value, Density::Projected(self.pdf(direction)), self.relative_index(direction))
-            }
+            (false, Walk::Light) => (bsdf.eval(direction, from), Density::Projected(self.pdf(direction))),
         };
         let usable = pdf.value() > 0.0 && pdf.value().is_finite() && value.max_element() > 0.0;
-        usable.then_some(BsdfSample { direction, value, pdf, eta, kind: s.kind })
+        usable.then_some(BsdfSample { direction, value, pdf, eta: s.eta, kind: s.kind })
     }
 
     /// What the walk does at the surface. `u` as in [`Sight::sample`].

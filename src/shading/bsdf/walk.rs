@@ -27,7 +27,7 @@ pub enum Event {
 pub struct Passage {
     /// Unit direction in which it goes on.
     pub direction: Vec3,
-    /// Coefficient of the Dirac delta: factor on basic radiance, or on flux.
+    /// Coefficient of the Dirac delta of étendue: factor on basic radiance.
     pub coefficient: Vec3,
     /// Probability of this choice, for the walk that made it.
     pub forward: f32,

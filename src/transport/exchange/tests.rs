@@ -19,7 +19,7 @@ fn both_ways(world: &World, count: u32) -> (CameraStore, LightStore) {
     let (mut camera, mut light) = (CameraStore::default(), LightStore::default());
     let follow = Follow { world, walk: Walk::Camera, from_camera: false };
     let mut push = |a: Arrival, out: Outgoing| {
-        camera.push(a, 1.0, NextEvent::default(), out);
+        camera.push(a, NextEvent::default(), out);
     };
     for k in 0..count {
         let mut sampler = Sampler::new(5, 0, k);
@@ -37,7 +37,7 @@ fn both_ways(world: &World, count: u32) -> (CameraStore, LightStore) {
         let (chain, next) = follow.segment(piece, &mut sampler, &mut Nobody, &mut 0);
         let Some(next) = next else { continue };
         let b = arrival(world, &next, next.sight().as_ref());
-        let squeeze = 1.0 / (chain.index * chain.index);
+        let squeeze = chain.squeeze;
         let out = Outgoing {
             direction: sample.direction,
             pdf: sample.pdf.value(),
@@ -126,7 +126,7 @@ fn sums_over_ten_million_segments_are_as_good_as_in_double_precision() {
     for k in 0..COUNT {
         let arrival = Arrival { survival: of(k, 1), ..one.arrivals.get(0) };
         let outgoing = Outgoing { pdf: of(k, 2), ..one.outgoing.get(0) };
-        camera.push(arrival, 1.0, NextEvent::default(), outgoing);
+        camera.push(arrival, NextEvent::default(), outgoing);
     }
     let values: Vec<Vec3> = (0..COUNT).map(|k| Vec3::new(1.0, of(k, 3), 1e10f32.powf(of(k, 4)))).collect();
     let (clusters, mut weights) = (clustered(&world, &camera, &light, Areas::None), Weights::default());

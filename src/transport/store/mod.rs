@@ -3,7 +3,7 @@
 //! An *arrival* is the far end of a generalised segment, on a surface that scatters continuously. Its path
 //! goes on in the next arrival of the same array, if it goes on. Directions are unit vectors in scene space and
 //! point away from the surface; densities are per projected solid angle about the geometric normal; radiance
-//! is basic radiance `L / n^2`, with the camera in a medium of index one.
+//! is basic radiance `L / n^2`, and flux that of basic radiance over `dA dw_perp`.
 //!
 //! What is kept is packed: directions to within 7e-5 rad, colours to within 1.2e-4 of their largest component. All techniques
 //! look at the same rounded directions, so their densities agree, but for lobes nearly as narrow as that.
@@ -20,7 +20,6 @@ pub use leaving::{NextEvents, Outgoings};
 pub use list::{List, Pack};
 pub use photons::{PackedPhoton, Photons};
 
-use super::sparse::Sparse;
 use crate::shading::bsdf::Bsdf;
 use crate::shading::emitters::Draw;
 use crate::shading::{Address, SurfaceClass, SurfacePoint, World};
@@ -149,7 +148,7 @@ pub struct LightStart {
 pub struct Photon {
     /// Its light path.
     pub path: u32,
-    /// Flux, W.
+    /// Flux of basic radiance, W.
     pub flux: Vec3,
     /// Times that the light has been scattered on its way here.
     pub bounces: u32,
@@ -184,15 +183,6 @@ pub enum Rivals {
     },
 }
 
-/// What the literal recursion alone needs to know of an arrival of a light path.
-#[derive(Clone, Copy, Debug)]
-pub struct Carry {
-    /// Throughput of the chain that ends there.
-    pub throughput: Vec3,
-    /// `1 / n^2` on the side arrived from, if the light stands in a medium of index one.
-    pub inverse_n2: f32,
-}
-
 /// The camera's side of an iteration. All but `hits` have one place for every arrival.
 #[derive(Clone, Debug, Default)]
 pub struct CameraStore {
@@ -206,8 +196,6 @@ pub struct CameraStore {
     pub hits: Hits,
     /// Contributions that were not finite and were dropped.
     pub dropped: u64,
-    /// See [`CameraStore::inverse_n2`]; where it is not one.
-    inverse_n2: Sparse<f32>,
 }
 
 /// The lights' side of an iteration.
@@ -219,8 +207,8 @@ pub struct LightStore {
     pub photons: Photons,
     /// One for every path that arrived somewhere.
     pub starts: Vec<LightStart>,
-    /// One for every arrival; empty unless the literal recursion asked for it.
-    pub carries: Vec<Carry>,
+    /// Throughput of the chain that ends at every arrival; empty unless the literal recursion asked for it.
+    pub carries: Vec<Vec3>,
 }
 
 fn bytes<T>(v: &Vec<T>) -> usize {
@@ -228,18 +216,11 @@ fn bytes<T>(v: &Vec<T>) -> usize {
 }
 
 impl CameraStore {
-    /// Adds an arrival, `1 / n^2` on the side arrived from, its next-event segment and the one that leaves it.
-    pub fn push(&mut self, a: Arrival, inverse_n2: f32, next_event: NextEvent, outgoing: Outgoing) {
+    /// Adds an arrival, its next-event segment and the one that leaves it.
+    pub fn push(&mut self, a: Arrival, next_event: NextEvent, outgoing: Outgoing) {
         self.arrivals.push(a);
-        self.inverse_n2.push((inverse_n2 != 1.0).then_some(inverse_n2));
         self.next_events.push(next_event);
         self.outgoing.push(outgoing);
-    }
-
-    /// `1 / n^2` on the side from which arrival `i` was arrived at.
-    #[inline]
-    pub fn inverse_n2(&self, i: usize) -> f32 {
-        self.inverse_n2.get(i).copied().unwrap_or(1.0)
     }
 
     /// Segments: those that leave arrivals, next-event segments, and one primary segment a path.
@@ -249,18 +230,13 @@ impl CameraStore {
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.arrivals.bytes()
-            + self.inverse_n2.bytes()
-            + self.outgoing.bytes()
-            + self.next_events.bytes()
-            + self.hits.bytes()
+        self.arrivals.bytes() + self.outgoing.bytes() + self.next_events.bytes() + self.hits.bytes()
     }
 
     /// Makes room for the paths of all these stores, too, and no more.
     pub fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
         let arrivals = parts.clone().map(|p| p.arrivals.len()).sum();
         self.arrivals.reserve(arrivals);
-        self.inverse_n2.reserve(arrivals, parts.clone().map(|p| p.inverse_n2.count()).sum());
         self.outgoing.reserve(parts.clone().map(|p| &p.outgoing));
         self.next_events.reserve(parts.clone().map(|p| &p.next_events));
         self.hits.reserve(arrivals, parts.map(|p| p.hits.len()).sum());
@@ -270,7 +246,6 @@ impl CameraStore {
     pub fn append(&mut self, other: &mut Self) -> u32 {
         let first = self.arrivals.len();
         self.arrivals.append(&mut other.arrivals);
-        self.inverse_n2.append(&mut other.inverse_n2);
         self.outgoing.append(&mut other.outgoing);
         self.next_events.append(&mut other.next_events);
         self.hits.append(&mut other.hits, first);
@@ -281,7 +256,6 @@ impl CameraStore {
     /// Empties the store and keeps its memory.
     pub fn clear(&mut self) {
         self.arrivals.clear();
-        self.inverse_n2.clear();
         self.outgoing.clear();
         self.next_events.clear();
         self.hits.clear();

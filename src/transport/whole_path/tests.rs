@@ -35,7 +35,7 @@ fn path(world: &World, number: u32) -> Option<Vec<Point>> {
     for k in 0..ARRIVALS {
         let (chain, end) = follow.segment(piece, &mut sampler, &mut Nobody, &mut 0);
         let end = end?;
-        let squeeze = 1.0 / (chain.index * chain.index);
+        let squeeze = chain.squeeze;
         if let Some(before) = points.last_mut() {
             let out = &mut before.outgoing;
             (out.forward, out.reverse, out.throughput) = (chain.forward, chain.reverse, chain.throughput);
@@ -77,13 +77,13 @@ fn path(world: &World, number: u32) -> Option<Vec<Point>> {
 }
 
 fn add_camera(store: &mut CameraStore, points: &[Point]) {
-    points.iter().for_each(|p| store.push(p.camera, 1.0, NextEvent::default(), p.outgoing));
+    points.iter().for_each(|p| store.push(p.camera, NextEvent::default(), p.outgoing));
 }
 
 fn add_path(store: &mut CameraStore, points: &[Point]) {
     let (last, before) = points.split_last().unwrap();
     add_camera(store, before);
-    store.push(last.camera, 1.0, NextEvent::default(), Outgoing { forward: 0.0, ..last.outgoing });
+    store.push(last.camera, NextEvent::default(), Outgoing { forward: 0.0, ..last.outgoing });
 }
 
 fn add_light(store: &mut LightStore, points: &[Point]) {
@@ -138,7 +138,7 @@ fn weight(world: &World, others: &[Vec<Point>], points: &[Point], technique: Tec
             };
         }
     }
-    camera.push(arrival, 1.0, next_event, Outgoing { forward: 0.0, ..end.outgoing });
+    camera.push(arrival, next_event, Outgoing { forward: 0.0, ..end.outgoing });
     // measured areas are a little different with every arrival that comes to a cluster
     let (clusters, mut weights) = (clustered(world, &camera, &light, Areas::None), Weights::default());
     let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters, bridges: None };

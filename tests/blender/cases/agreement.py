@@ -262,6 +262,28 @@ def case_white_metals_reflect_all_light() -> None:
         assert abs(ball_mean - 1.0) < 0.01
 
 
+def case_media_are_as_bright_as_in_cycles() -> None:
+    """A window of a single sheet, a lamp inside of glass, and a camera inside of glass: radiance has no factor of the index."""
+    for place in ("window", "lamp", "camera"):
+        _stage("BsdfDiffuse", {"Color": (0.6, 0.5, 0.4, 1)})
+        glass = builders.shader_material("BsdfGlass", "Glass", IOR=1.5)
+        if place == "window":
+            sheet = builders.quad("Sheet", 2.0)
+            pose = Matrix.Translation((0, -3, 1.5)) @ Euler((1.3, 0, 0)).to_matrix().to_4x4()
+        else:
+            sheet = builders.sphere("Sheet", 1.3 if place == "lamp" else 1.0, 64, 32)
+            centre = (0, 0, 1.05) if place == "lamp" else (0, -5, 2.5)
+            pose = Matrix.Translation(centre)
+        if place == "lamp":
+            glowing = builders.shader_material("Emission", "Glowing", Strength=2.0)
+            bpy.data.objects["Ball"].data.materials[0] = glowing
+        sheet.materials.append(glass)
+        builders.link(sheet, matrix=pose)
+        found = agreement.compare(*agreement.render_both(64, 48, 512, 512))
+        print(place)
+        _check(found, mean=0.01, blocks=0.03, correlation=0.995)
+
+
 def case_lights_one_by_one() -> None:
     """Every kind of light, alone, over a floor with a cube."""
     soft = {"use_soft_falloff": False}
