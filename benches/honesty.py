@@ -21,7 +21,7 @@ ROOT = Path(__file__).parent.parent
 KEPT = ROOT / "results" / "honesty"
 RESOLUTION, THREADS = [192, 108], 1
 SECONDS = (3, 10, 30)
-SEEDS = 2
+SEEDS = 4
 REFERENCE_SECONDS = float(os.environ.get("SEGUE_SECONDS", "120"))
 #: Where single segments find too little light for a kernel of a third of a pixel, and times as many seconds.
 COARSER: dict[str, tuple[dict[str, object], float]] = {

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{PATH, Stage, icosphere};
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec3, Vec3};
 use segue::film::Pass;
 
 /// The mean of a pass and its standard error, from 8 seeds.
@@ -54,9 +54,13 @@ fn compare_pass(
 /// A ball of facets, with smoothed normals or its own. Light that a smoothed facet sends below the horizon of its
 /// shading normal is found from the camera alone.
 fn ball(s: &mut Stage, material: &str, is_smooth: bool) {
-    let material = s.material(material);
     let (points, triangles) = icosphere(3);
-    let mesh = s.mesh(&points, &triangles, is_smooth.then_some(&points));
+    place_ball(s, material, &points, &triangles, is_smooth);
+}
+
+fn place_ball(s: &mut Stage, material: &str, points: &[Vec3], triangles: &[u32], is_smooth: bool) {
+    let material = s.material(material);
+    let mesh = s.mesh(points, triangles, is_smooth.then_some(points));
     let at = DMat4::from_translation(DVec3::new(0.2, 0.1, 0.5)) * DMat4::from_scale(DVec3::splat(0.45));
     s.place(mesh, material, at);
 }
@@ -142,6 +146,41 @@ fn surfaces_that_are_mirrors_in_part_agree() {
     lamp(&mut s);
     s.light(DOME);
     compare("half mirrors", &s, COMPLETE, (24, 24), "");
+}
+
+/// What mirrors bends its normals to where it is looked at from, which differs between the walks.
+#[test]
+fn coarse_smoothed_mirrors_agree() {
+    let part = r#"{"surface":{"type":"principled","base_color":[0.8,0.3,0.2],"roughness":0.4,
+        "coat":1,"coat_roughness":0}}"#;
+    let mirror = r#"{"surface":{"type":"glossy","color":0.9,"roughness":0}}"#;
+    let brushed = r#"{"surface":{"type":"glossy","color":0.9,"roughness":0.3}}"#;
+    const METHODS: Methods = &[("bdpt", 0.0), ("vcm", 5e-3), ("segment", 5e-3)];
+    for material in [mirror, brushed, part, GLASS] {
+        let mut s = Stage::default();
+        let wall = s.material(WALL);
+        s.corner(wall);
+        let (points, triangles) = icosphere(1);
+        place_ball(&mut s, material, &points, &triangles, true);
+        s.camera(DVec3::new(0.6, -3.0, 1.3), DVec3::new(0.0, 0.0, 0.8), 0.4, "");
+        lamp(&mut s);
+        s.light(DOME);
+        compare(material, &s, METHODS, (24, 48), "");
+    }
+    // floor beside a plate whose normals lean by 60 degrees: all of the lamp's light in it is by bent normals
+    for lean in [1.0, -1.0] {
+        let mut s = Stage::default();
+        let (floor, plate) = (s.material(WALL), s.material(mirror));
+        s.quad([[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]], floor);
+        let corners = [(-1.0, 0.0), (1.0, 0.0), (1.0, 1.5), (-1.0, 1.5)].map(|(y, z)| Vec3::new(1.0, y, z));
+        let normal = Vec3::new(-0.5, 0.0, lean * 0.75f32.sqrt());
+        let mesh = s.mesh(&corners, &[0, 2, 1, 0, 3, 2], Some(&[normal; 4]));
+        s.place(mesh, plate, DMat4::IDENTITY);
+        s.camera(DVec3::new(-0.2, 0.0, 1.7), DVec3::new(0.3, 0.0, 0.0), 0.2, "");
+        let glow = s.material(r#"{"surface":{"type":"emission","strength":3}}"#);
+        s.quad([[-0.7, -0.7, 1.95], [-0.7, 0.7, 1.95], [1.5, 0.7, 1.95], [1.5, -0.7, 1.95]], glow);
+        compare_pass(&format!("plate, {lean}"), &s, METHODS, (24, 96), Pass::Indirect, "");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Orthonormal frames.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 /// A right-handed orthonormal frame; local z is the normal `n`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +44,12 @@ impl Frame {
     pub fn turned(&self, turns: f32) -> Self {
         let (sin, cos) = (std::f32::consts::TAU * turns).sin_cos();
         Self { s: self.s * cos + self.t * sin, t: self.t * cos - self.s * sin, n: self.n }
+    }
+
+    /// The frame turned the shortest way to the unit normal `n`.
+    pub fn leaned(&self, n: Vec3) -> Self {
+        let s = Quat::from_rotation_arc(self.n, n) * self.s;
+        Self { s, t: n.cross(s), n }
     }
 
     /// World to local.

@@ -94,14 +94,14 @@ impl Materials {
 
     /// The scattering at a point. Transparent closures are not in it: they belong to visibility.
     /// `wo`: the direction it is seen from, which decides how much the layers of a principled surface hide
-    /// of each other.
+    /// of each other, and how far normals of what mirrors may lean.
     pub fn bsdf(&self, p: &SurfacePoint, wo: Vec3) -> Bsdf {
-        let mut builder = BsdfBuilder::new(p.place.normal);
-        self.push(&mut builder, &self.scene.materials[p.material as usize].surface, Vec3::ONE, p, wo);
+        let mut builder = BsdfBuilder::new(p.place.normal, wo);
+        self.push(&mut builder, &self.scene.materials[p.material as usize].surface, Vec3::ONE, p);
         builder.build()
     }
 
-    fn push(&self, builder: &mut BsdfBuilder, closure: &Closure, weight: Vec3, p: &SurfacePoint, wo: Vec3) {
+    fn push(&self, builder: &mut BsdfBuilder, closure: &Closure, weight: Vec3, p: &SurfacePoint) {
         let color = |v: &Value| self.textures.color(v, &p.at).max(Vec3::ZERO);
         let number = |v: &Value| self.textures.number(v, &p.at);
         let frame = |n: &Option<NormalMap>| self.frame(n.as_ref(), p);
@@ -145,19 +145,19 @@ impl Materials {
                 let lobe = Sheen::new(number(roughness));
                 builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Sheen(lobe));
             }
-            Closure::Principled(c) => self.push_principled(builder, c, weight, p, wo),
+            Closure::Principled(c) => self.push_principled(builder, c, weight, p),
             Closure::Mix { factor, a, b } => {
                 let f = number(factor).clamp(0.0, 1.0);
                 if f < 1.0 {
-                    self.push(builder, a, weight * (1.0 - f), p, wo);
+                    self.push(builder, a, weight * (1.0 - f), p);
                 }
                 if f > 0.0 {
-                    self.push(builder, b, weight * f, p, wo);
+                    self.push(builder, b, weight * f, p);
                 }
             }
             Closure::Add { a, b } => {
-                self.push(builder, a, weight, p, wo);
-                self.push(builder, b, weight, p, wo);
+                self.push(builder, a, weight, p);
+                self.push(builder, b, weight, p);
             }
             Closure::Transparent { .. } | Closure::Emission { .. } => {}
         }
@@ -169,7 +169,6 @@ impl Materials {
         c: &PrincipledClosure,
         weight: Vec3,
         p: &SurfacePoint,
-        wo: Vec3,
     ) {
         let color = |v: &Value| self.textures.color(v, &p.at).max(Vec3::ZERO);
         let number = |v: &Value| self.textures.number(v, &p.at);
@@ -208,7 +207,7 @@ impl Materials {
                 MetalEdge::Base => MetalF90::Base,
             },
         };
-        model.push(builder, weight, wo, frame, coat_frame);
+        model.push(builder, weight, frame, coat_frame);
     }
 
     /// The shading frame, with a normal map where there is one.

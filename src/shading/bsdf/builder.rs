@@ -1,5 +1,6 @@
 //! Collecting lobes into a [`Bsdf`].
 
+use super::bend::bent;
 use super::{Bsdf, Entry};
 use crate::math::Frame;
 use crate::shading::lobes::Lobe;
@@ -13,13 +14,19 @@ pub const CAPACITY: usize = 10;
 #[derive(Clone, Debug)]
 pub struct BsdfBuilder {
     bsdf: Bsdf,
+    wo: Vec3,
     dropped: u32,
 }
 
 impl BsdfBuilder {
-    /// No lobes yet. `ng`: unit geometric normal, pointing out of the object.
-    pub fn new(ng: Vec3) -> Self {
-        Self { bsdf: Bsdf { ng, entries: SmallVec::new() }, dropped: 0 }
+    /// No lobes yet. `ng`: unit geometric normal, pointing out of the object; `wo`: the direction looked from.
+    pub fn new(ng: Vec3, wo: Vec3) -> Self {
+        Self { bsdf: Bsdf { ng, entries: SmallVec::new() }, wo, dropped: 0 }
+    }
+
+    /// The direction looked from.
+    pub fn wo(&self) -> Vec3 {
+        self.wo
     }
 
     /// Adds a lobe. The normal of `frame` is the shading normal; it is turned to the side of the
@@ -30,12 +37,12 @@ impl BsdfBuilder {
     }
 
     /// Adds a lobe that lies over those pushed later. `weight`: of the whole stack; `share`: of the lobe in
-    /// it. Returns how much of the light seen along `wo` (world space) the lobe leaves to what is below: one
-    /// minus the largest channel of its directional albedo.
-    pub fn push_layer(&mut self, weight: Vec3, share: Vec3, frame: Frame, lobe: Lobe, wo: Vec3) -> f32 {
+    /// it. Returns how much of the light that is seen the lobe leaves to what is below: one minus the largest channel
+    /// of its directional albedo.
+    pub fn push_layer(&mut self, weight: Vec3, share: Vec3, frame: Frame, lobe: Lobe) -> f32 {
         let entry = self.entry(weight * share, frame, lobe);
-        let side = 1f32.copysign(self.bsdf.ng.dot(wo));
-        let albedo = entry.seen_from(wo, side).map_or(Vec3::ZERO, |o| share * lobe.albedo(o));
+        let side = 1f32.copysign(self.bsdf.ng.dot(self.wo));
+        let albedo = entry.seen_from(self.wo, side).map_or(Vec3::ZERO, |o| share * lobe.albedo(o));
         self.push_entry(entry);
         1.0 - albedo.max_element().clamp(0.0, 1.0)
     }
@@ -48,7 +55,10 @@ impl BsdfBuilder {
         } else {
             frame
         };
-        Entry { weight, frame, lobe, delta: lobe.is_delta() }
+        let bent = if lobe.is_specular() { bent(self.bsdf.ng, frame.n, self.wo) } else { None };
+        let is_bent = bent.is_some();
+        let frame = bent.map_or(frame, |n| frame.leaned(n));
+        Entry { weight, frame, lobe, delta: lobe.is_delta(), is_bent }
     }
 
     fn push_entry(&mut self, entry: Entry) {

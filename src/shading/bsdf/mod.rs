@@ -8,8 +8,9 @@
 //! Which side of the surface a direction is on is decided by the geometric normal alone, so no light
 //! leaks through a closed surface. Where the shading normal disagrees about the light side `wi`, nothing
 //! is scattered; where it disagrees about the side looked from, which bumps and smoothed silhouettes make
-//! common, a continuous lobe is evaluated as seen at grazing incidence, and a delta lobe absorbs.
+//! common, specular lobes have another (`bend`), and other lobes are evaluated as seen at grazing incidence.
 
+mod bend;
 mod builder;
 pub mod principled;
 mod sight;
@@ -68,6 +69,8 @@ struct Entry {
     frame: Frame,
     lobe: Lobe,
     delta: bool,
+    /// Whether the normal is not the shading normal; see [`bend`].
+    is_bent: bool,
 }
 
 /// Cosine to which the direction looked from is raised where the shading normal faces away from it.
@@ -86,6 +89,11 @@ impl Entry {
             let flat = v.truncate().normalize_or(glam::Vec2::X);
             Some((flat * (1.0 - GRAZING * GRAZING).sqrt()).extend(GRAZING * side))
         }
+    }
+
+    /// Whether a walk that comes along this lobe from `w` would see it bent, or whether it is bent.
+    fn bends_from(&self, ng: Vec3, w: Vec3) -> bool {
+        self.is_bent || (self.lobe.is_specular() && bend::bent(ng, self.frame.n, w).is_some())
     }
 
     /// The other direction in the local frame; `None` where the shading normal disagrees about its side.

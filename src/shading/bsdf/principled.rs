@@ -70,19 +70,18 @@ pub struct Principled {
 const MAX_F0: f32 = 0.99;
 
 impl Principled {
-    /// Pushes the lobes. `wo`: the direction looked from, world space; `frame`: of the base, its x axis the
-    /// tangent of the anisotropy; `coat_frame`: of the coat.
-    pub fn push(&self, builder: &mut BsdfBuilder, weight: Vec3, wo: Vec3, frame: Frame, coat_frame: Frame) {
+    /// Pushes the lobes. `frame`: of the base, its x axis the tangent of the anisotropy; `coat_frame`: of the coat.
+    pub fn push(&self, builder: &mut BsdfBuilder, weight: Vec3, frame: Frame, coat_frame: Frame) {
         let mut weight = weight;
         if self.sheen > 0.0 {
             // fibres follow the surface that is outermost
             let n = frame.n.lerp(coat_frame.n, self.coat).try_normalize().unwrap_or(frame.n);
             let lobe = Lobe::Sheen(Sheen::new(self.sheen_roughness));
             let share = self.sheen * self.sheen_tint;
-            weight *= builder.push_layer(weight, share, Frame::from_normal(n), lobe, wo);
+            weight *= builder.push_layer(weight, share, Frame::from_normal(n), lobe);
         }
         if self.coat > 0.0 {
-            weight = self.push_coat(builder, weight, wo, coat_frame);
+            weight = self.push_coat(builder, weight, coat_frame);
         }
         let grain = match self.anisotropy == 0.0 {
             true => (Ggx::from_roughness(self.roughness), frame),
@@ -102,22 +101,22 @@ impl Principled {
         }
         if let Some(fresnel) = self.specular() {
             let lobe = Lobe::Reflection(Reflection::new(grain.0, fresnel));
-            weight *= builder.push_layer(weight, Vec3::ONE, grain.1, lobe, wo);
+            weight *= builder.push_layer(weight, Vec3::ONE, grain.1, lobe);
         }
         self.push_diffuse(builder, weight, frame);
     }
 
     /// Returns the weight of what is below.
-    fn push_coat(&self, builder: &mut BsdfBuilder, weight: Vec3, wo: Vec3, frame: Frame) -> Vec3 {
+    fn push_coat(&self, builder: &mut BsdfBuilder, weight: Vec3, frame: Frame) -> Vec3 {
         let eta = self.coat_ior.max(1.0);
         let fresnel = Fresnel::Dielectric { eta, f0: Vec3::splat(f0_from_ior(eta)) };
         let mut weight = weight;
         if eta > 1.0 {
             let lobe = Lobe::Reflection(Reflection::new(Ggx::from_roughness(self.coat_roughness), fresnel));
-            weight *= builder.push_layer(weight, Vec3::splat(self.coat), frame, lobe, wo);
+            weight *= builder.push_layer(weight, Vec3::splat(self.coat), frame, lobe);
         }
         // Beer's law along the refracted direction, the tint being that of the shortest path
-        let cos = frame.n.dot(wo).min(1.0);
+        let cos = frame.n.dot(builder.wo()).min(1.0);
         let cos_t = (1.0 - (1.0 - cos * cos) / (eta * eta)).max(1e-6).sqrt();
         let tint = self.coat_tint.powf(1.0 / cos_t);
         weight * Vec3::ONE.lerp(tint, self.coat)

@@ -94,6 +94,9 @@ impl Sight<'_> {
         let local = self.locals[k]?;
         let s = e.lobe.sample(local, u)?;
         let direction = e.frame.to_world(s.direction).normalize();
+        if e.delta && walk == Walk::Light && e.bends_from(bsdf.ng, direction) {
+            return None;
+        }
         let cos_to = bsdf.ng.dot(direction);
         let side_to = match s.kind.side {
             Side::Reflection => self.side,
@@ -133,7 +136,8 @@ impl Sight<'_> {
         // a lobe's own choice between reflection and refraction is the same from both sides
         let within = forward / self.choice.probability(k);
         let Some(back) = self.bsdf.sight(s.direction, Among::All) else { return Event::Absorbed };
-        let reverse = within * back.choice.probability(k);
+        let one_way = walk == Walk::Camera && self.bsdf.entries()[k].bends_from(self.bsdf.ng, s.direction);
+        let reverse = if one_way { 0.0 } else { within * back.choice.probability(k) };
         Event::Passes(Passage { direction: s.direction, coefficient: s.value, forward, reverse, eta: s.eta })
     }
 

@@ -220,6 +220,12 @@ impl Lobe {
         }
     }
 
+    /// Whether it mirrors, more or less sharply, about a normal.
+    #[inline]
+    pub fn is_specular(&self) -> bool {
+        matches!(self, Self::Reflection(_) | Self::Dielectric(_))
+    }
+
     /// Whether it scatters light to the other side.
     #[inline]
     pub fn transmits(&self) -> bool {

@@ -262,6 +262,18 @@ def case_white_metals_reflect_all_light() -> None:
         assert abs(ball_mean - 1.0) < 0.01
 
 
+def case_coarse_smoothed_mirrors_have_no_dark_rims() -> None:
+    """Shading normals lean so far at the silhouette that the mirrored direction would be inside of the ball."""
+    _stage("BsdfAnisotropic", {"Roughness": 0.0})
+    ball = bpy.data.objects["Ball"]
+    coarse = builders.sphere("Coarse", 1.0, 12, 6)
+    coarse.polygons.foreach_set("use_smooth", [True] * len(coarse.polygons))
+    coarse.materials.append(ball.data.materials[0])
+    ball.data = coarse
+    found = agreement.compare(*agreement.render_both(64, 48, 128, 128))
+    _check(found, mean=0.003, blocks=0.02, correlation=0.9995)
+
+
 def case_media_are_as_bright_as_in_cycles() -> None:
     """A window of a single sheet, a lamp inside of glass, and a camera inside of glass: radiance has no factor of the index."""
     for place in ("window", "lamp", "camera"):

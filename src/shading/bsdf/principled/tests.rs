@@ -32,8 +32,8 @@ fn white() -> Principled {
 }
 
 fn build(p: &Principled, wo: Vec3) -> Bsdf {
-    let mut builder = BsdfBuilder::new(Vec3::Z);
-    p.push(&mut builder, Vec3::ONE, wo, FRAME, FRAME);
+    let mut builder = BsdfBuilder::new(Vec3::Z, wo);
+    p.push(&mut builder, Vec3::ONE, FRAME, FRAME);
     assert_eq!(builder.dropped(), 0);
     builder.build()
 }
