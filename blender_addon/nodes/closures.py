@@ -299,20 +299,33 @@ class ClosureTranslator:
         )
 
     def _normal(self, entry: bpy.types.NodeSocket | None, stack: Stack) -> dict[str, Any] | None:
-        """The normal map at a Normal input; None for the surface's own normal."""
+        """The normal or bump map at a Normal input; None for the surface's own normal."""
         source = resolve(entry, stack) if entry is not None else None
         if source is None or source.node is None:
             return None
         node = source.node
         if node.bl_idname == "ShaderNodeBump":
-            self.ev.warn(node, "bump mapping", "the normal below it is used")
-            return self._normal(node.inputs["Normal"], source.stack)
+            return self._bump_map(node, source.stack)
         if node.bl_idname == "ShaderNodeNewGeometry" and source.output.identifier == "Normal":
             return None
         if node.bl_idname != "ShaderNodeNormalMap":
             self.ev.warn(node, "a computed normal", "the surface's own is used")
             return None
         return self._normal_map(node, source.stack)
+
+    def _bump_map(self, node: bpy.types.Node, stack: Stack) -> dict[str, Any] | None:
+        below = self._normal(node.inputs["Normal"], stack)
+        height = self.ev.value(node.inputs["Height"], stack)
+        if isinstance(height, Constant):
+            return below
+        distance = self.ev.number(node.inputs["Distance"], stack)
+        strength = self.ev.value(node.inputs["Strength"], stack)
+        bump = {
+            "height": self.ev.textures.json(height, "float"),
+            "distance": -distance if node.invert else distance,
+            "strength": self.ev.textures.json(strength, "float"),
+        }
+        return bump | ({"normal": below} if below else {})
 
     def _normal_map(self, node: bpy.types.Node, stack: Stack) -> dict[str, Any] | None:
         space = {"TANGENT": "tangent", "OBJECT": "object", "WORLD": "world"}.get(node.space)

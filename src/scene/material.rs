@@ -1,38 +1,9 @@
 //! Materials: a small tree of closures whose parameters are constants or textures.
 
 use super::SceneError;
-use super::value::{Channel, Value};
+use super::relief::Relief;
+use super::value::Value;
 use serde::Deserialize;
-
-/// The space a normal map's vectors are in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum NormalSpace {
-    /// Tangent (along u), bitangent, normal.
-    #[default]
-    Tangent,
-    /// The mesh's own space.
-    Object,
-    /// The world's.
-    World,
-}
-
-/// A normal map.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct NormalMap {
-    /// Texture whose colour is the normal in `[-1,1]`.
-    pub texture: u32,
-    /// 0 leaves the surface's normal, 1 takes the map's.
-    #[serde(default = "one")]
-    pub strength: Value,
-    /// Space of the vectors.
-    #[serde(default)]
-    pub space: NormalSpace,
-    /// UV set the tangents come from; empty is the first one.
-    #[serde(default)]
-    pub uv: String,
-}
 
 /// Reflectance of metal at grazing angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
@@ -98,7 +69,7 @@ pub struct PrincipledClosure {
     pub coat_ior: Value,
     #[serde(default = "one")]
     pub coat_tint: Value,
-    pub coat_normal: Option<NormalMap>,
+    pub coat_normal: Option<Relief>,
     #[serde(default = "zero")]
     pub sheen: Value,
     #[serde(default = "half")]
@@ -111,7 +82,7 @@ pub struct PrincipledClosure {
     pub emission_strength: Value,
     #[serde(default)]
     pub metal_f90: MetalEdge,
-    pub normal: Option<NormalMap>,
+    pub normal: Option<Relief>,
 }
 
 /// A node of a material's tree. Parameters and their defaults are those of `docs/abi.md`.
@@ -125,7 +96,7 @@ pub enum Closure {
         color: Value,
         #[serde(default = "zero")]
         roughness: Value,
-        normal: Option<NormalMap>,
+        normal: Option<Relief>,
     },
     /// Microfacet reflection of constant reflectance.
     Glossy {
@@ -137,7 +108,7 @@ pub enum Closure {
         anisotropy: Value,
         #[serde(default = "zero")]
         rotation: Value,
-        normal: Option<NormalMap>,
+        normal: Option<Relief>,
     },
     /// Dielectric interface: reflection and refraction.
     Glass {
@@ -147,7 +118,7 @@ pub enum Closure {
         roughness: Value,
         #[serde(default = "glass_ior")]
         ior: Value,
-        normal: Option<NormalMap>,
+        normal: Option<Relief>,
     },
     /// Refraction without reflection.
     Refraction {
@@ -157,7 +128,7 @@ pub enum Closure {
         roughness: Value,
         #[serde(default = "glass_ior")]
         ior: Value,
-        normal: Option<NormalMap>,
+        normal: Option<Relief>,
     },
     /// Straight through.
     Transparent {
@@ -168,7 +139,7 @@ pub enum Closure {
     Translucent {
         #[serde(default = "eight_tenths")]
         color: Value,
-        normal: Option<NormalMap>,
+        normal: Option<Relief>,
     },
     /// Cloth-like retroreflection at grazing angles.
     Sheen {
@@ -176,7 +147,7 @@ pub enum Closure {
         color: Value,
         #[serde(default = "half")]
         roughness: Value,
-        normal: Option<NormalMap>,
+        normal: Option<Relief>,
     },
     /// Emitted radiance, `color * strength`.
     Emission {
@@ -310,8 +281,8 @@ impl Closure {
         }
     }
 
-    /// The normal maps of this closure alone.
-    pub fn normal_maps(&self) -> impl Iterator<Item = &NormalMap> {
+    /// What gives normals to this closure alone.
+    pub fn reliefs(&self) -> impl Iterator<Item = &Relief> {
         let (normal, coat) = match self {
             Self::Diffuse { normal, .. }
             | Self::Glossy { normal, .. }
@@ -376,10 +347,7 @@ impl Closure {
             Self::Mix { factor, .. } => f(factor),
             Self::Add { .. } => {}
         }
-        for map in self.normal_maps() {
-            f(&map.strength);
-            f(&Value::Texture { texture: map.texture, channel: Channel::Rgb });
-        }
+        self.reliefs().for_each(|relief| relief.for_each_value(f));
     }
 }
 

@@ -10,6 +10,7 @@ pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod needs;
+pub mod relief;
 pub mod texture;
 mod triangulate;
 pub mod value;

@@ -19,7 +19,7 @@ pub struct Needs {
     pub depth_of_field: bool,
     /// Some parameter comes from a texture.
     pub textures: bool,
-    /// Some material has a normal map.
+    /// Some material has a normal map or a bump map.
     pub normal_maps: bool,
     /// Some surface emits.
     pub emissive_surfaces: bool,
@@ -73,7 +73,7 @@ impl Needs {
                 m.for_each_value(&mut |v| found |= matches!(v, Value::Texture { .. }));
                 found
             }),
-            normal_maps: any_closure(&|c| c.normal_maps().next().is_some()),
+            normal_maps: any_closure(&|c| c.reliefs().next().is_some()),
             emissive_surfaces: any_closure(&may_emit),
             light_shapes: scene.lights.iter().any(|l| {
                 !matches!(
@@ -96,7 +96,7 @@ impl Needs {
             (self.camera_visibility, "visibility tests of camera rays: no object is hidden from the camera"),
             (self.depth_of_field, "lens sampling: the camera is a pinhole"),
             (self.textures, "texture lookups: every used material is constant"),
-            (self.normal_maps, "tangent frames: no used material has a normal map"),
+            (self.normal_maps, "tangent frames: no used material has a normal or bump map"),
             (self.emissive_surfaces, "emission of surfaces: no used material emits"),
             (self.light_shapes, "intersection with light shapes: no light has one"),
             (self.infinite_lights, "environment: no light is infinitely far away"),

@@ -2,21 +2,22 @@
 
 use super::bsdf::{Bsdf, BsdfBuilder, CAPACITY, MetalF90, Principled};
 use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen, Translucent};
-use super::surface::{SurfacePoint, normal_matrix, normalize_any};
+use super::surface::SurfacePoint;
 use super::texture::{MeshPoint, TextureSet};
 use crate::math::Frame;
-use crate::scene::material::{Closure, MetalEdge, NormalMap, NormalSpace, PrincipledClosure};
+use crate::scene::material::{Closure, MetalEdge, PrincipledClosure};
 use crate::scene::needs::may_be_transparent;
+use crate::scene::relief::Relief;
 use crate::scene::value::Value;
 use crate::scene::{Scene, Warnings};
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 use std::sync::Arc;
 
 /// All materials of a scene, ready to be evaluated.
 #[derive(Debug)]
 pub struct Materials {
-    scene: Arc<Scene>,
-    textures: TextureSet,
+    pub(super) scene: Arc<Scene>,
+    pub(super) textures: TextureSet,
     /// For each material, whether light may pass straight through.
     transparent: Vec<bool>,
 }
@@ -104,7 +105,7 @@ impl Materials {
     fn push(&self, builder: &mut BsdfBuilder, closure: &Closure, weight: Vec3, p: &SurfacePoint) {
         let color = |v: &Value| self.textures.color(v, &p.at).max(Vec3::ZERO);
         let number = |v: &Value| self.textures.number(v, &p.at);
-        let frame = |n: &Option<NormalMap>| self.frame(n.as_ref(), p);
+        let frame = |n: &Option<Relief>| self.frame(n.as_ref(), p);
         match closure {
             Closure::Diffuse { color: c, roughness, normal } => {
                 let (c, sigma) = (color(c).min(Vec3::ONE), number(roughness));
@@ -208,46 +209,6 @@ impl Materials {
             },
         };
         model.push(builder, weight, frame, coat_frame);
-    }
-
-    /// The shading frame, with a normal map where there is one.
-    fn frame(&self, map: Option<&NormalMap>, p: &SurfacePoint) -> Frame {
-        match map {
-            None => Frame::from_normal(p.ns),
-            Some(map) => Frame::from_normal(self.mapped_normal(map, p)),
-        }
-    }
-
-    /// The shading frame with its x axis along the u direction of the first UV set.
-    fn tangent_frame(&self, map: Option<&NormalMap>, p: &SurfacePoint) -> Frame {
-        let n = map.map_or(p.ns, |map| self.mapped_normal(map, p));
-        let tangent = self.textures.uv_set("", p.at.mesh).map_or(Vec3::ZERO, |i| p.tangent(&self.scene, i));
-        Frame::from_normal_tangent(n, tangent)
-    }
-
-    fn mapped_normal(&self, map: &NormalMap, p: &SurfacePoint) -> Vec3 {
-        let v = self.textures.lookup(map.texture, &p.at).truncate();
-        let n = match map.space {
-            NormalSpace::World => v,
-            NormalSpace::Object => {
-                let m = Mat3::from(self.scene.instances[p.instance as usize].to_world.matrix3);
-                normal_matrix(m) * v
-            }
-            NormalSpace::Tangent => {
-                let Some(set) = self.textures.uv_set(&map.uv, p.at.mesh) else { return p.ns };
-                let tangent = p.tangent(&self.scene, set);
-                if tangent == Vec3::ZERO {
-                    return p.ns;
-                }
-                let f = Frame::from_normal_tangent(p.ns, tangent);
-                let bitangent = if p.uv_is_mirrored(&self.scene, set) { -f.t } else { f.t };
-                f.s * v.x + bitangent * v.y + f.n * v.z
-            }
-        };
-        let n = normalize_any(n);
-        let strength = self.textures.number(&map.strength, &p.at).max(0.0);
-        let n = normalize_any(p.ns + (n - p.ns) * strength);
-        if n == Vec3::ZERO { p.ns } else { n }
     }
 
     /// Texture coordinates of a point in the mesh's first UV set; zero without one.

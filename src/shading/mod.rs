@@ -10,6 +10,7 @@ mod first_hit;
 mod light_ray;
 mod material;
 mod ray;
+mod relief;
 mod sensor;
 mod surface;
 mod texture;

@@ -95,6 +95,14 @@ impl SurfacePoint {
         Receiver { position: self.place.position, normal: (!bsdf.transmits()).then_some(facing) }
     }
 
+    /// The edges of the triangle that leave its first vertex, in the world.
+    pub fn edges(&self, scene: &Scene) -> [Vec3; 2] {
+        let mesh: &Mesh = &scene.meshes[self.at.mesh as usize];
+        let [a, b, c] = mesh.triangles[self.at.triangle as usize].map(|i| mesh.positions[i as usize]);
+        let matrix = Mat3::from(scene.instances[self.instance as usize].to_world.matrix3);
+        [matrix * (b - a), matrix * (c - a)]
+    }
+
     /// The world-space derivative of the position by u of a UV set, or zero where it has none.
     pub fn tangent(&self, scene: &Scene, uv_set: usize) -> Vec3 {
         let mesh: &Mesh = &scene.meshes[self.at.mesh as usize];

@@ -90,26 +90,46 @@ impl TextureSet {
     pub fn color(&self, value: &Value, at: &MeshPoint) -> Vec3 {
         match *value {
             Value::Constant(c) => c,
-            Value::Texture { texture, channel } => {
-                let v = self.lookup(texture, at);
-                match channel {
-                    Channel::Rgb => v.truncate(),
-                    Channel::R => Vec3::splat(v.x),
-                    Channel::G => Vec3::splat(v.y),
-                    Channel::B => Vec3::splat(v.z),
-                    Channel::A => Vec3::splat(v.w),
-                    Channel::Luminance => Vec3::splat(luminance(v.truncate())),
-                    Channel::Average => Vec3::splat(v.truncate().element_sum() / 3.0),
-                }
-            }
+            Value::Texture { texture, channel } => part(channel, self.lookup(texture, at)),
         }
     }
 
     /// A parameter as a number; a colour counts by its luminance.
     #[inline]
     pub fn number(&self, value: &Value, at: &MeshPoint) -> f32 {
-        let c = self.color(value, at);
-        if c.x == c.y && c.y == c.z { c.x } else { luminance(c) }
+        grey(self.color(value, at))
+    }
+
+    /// How much a number changes along the edges of the triangle that leave its first vertex, over the whole of each: in an image as
+    /// from one texel to the next.
+    pub fn slopes(&self, value: &Value, at: &MeshPoint) -> Vec2 {
+        let Value::Texture { texture, channel } = *value else { return Vec2::ZERO };
+        let read = |v: Vec4| grey(part(channel, v));
+        let mesh = &self.scene.meshes[at.mesh as usize];
+        let vertices = mesh.triangles[at.triangle as usize];
+        match &self.scene.textures[texture as usize] {
+            Texture::Constant(_) => Vec2::ZERO,
+            Texture::Image(t) => {
+                let names = (&self.uv_names[at.mesh as usize], self.texture_names[texture as usize]);
+                let Some(set) = index(names.0, names.1) else { return Vec2::ZERO };
+                let Ok([a, b, c]) = mesh.uvs[set].1.corners(at.triangle as usize, vertices) else {
+                    return Vec2::ZERO;
+                };
+                let image = &self.scene.images[t.image as usize];
+                let size = Vec2::new(image.width() as f32, image.height() as f32);
+                let st = t.transform.transform_point2(interpolate(&mesh.uvs[set].1, mesh, at));
+                let at = |st: Vec2| read(sample(image, t, st) * t.scale + t.bias);
+                let across = |texel: Vec2| at(st + 0.5 * texel / size) - at(st - 0.5 * texel / size);
+                let gradient = Vec2::new(across(Vec2::X), across(Vec2::Y)) * size;
+                let along = |edge: Vec2| gradient.dot(t.transform.transform_vector2(edge));
+                Vec2::new(along(b - a), along(c - a))
+            }
+            Texture::Attribute { .. } => {
+                let corner = |u, v| self.lookup(texture, &MeshPoint { barycentrics: Vec2::new(u, v), ..*at });
+                let [a, b, c] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)].map(read);
+                Vec2::new(b - a, c - a)
+            }
+        }
     }
 
     /// Index in the mesh's list of the UV set that `name` (of a normal map) means.
@@ -122,6 +142,22 @@ impl TextureSet {
         let i = index(&self.uv_names[at.mesh as usize], self.texture_names[texture as usize])?;
         Some(interpolate(&mesh.uvs[i].1, mesh, at))
     }
+}
+
+fn part(channel: Channel, v: Vec4) -> Vec3 {
+    match channel {
+        Channel::Rgb => v.truncate(),
+        Channel::R => Vec3::splat(v.x),
+        Channel::G => Vec3::splat(v.y),
+        Channel::B => Vec3::splat(v.z),
+        Channel::A => Vec3::splat(v.w),
+        Channel::Luminance => Vec3::splat(luminance(v.truncate())),
+        Channel::Average => Vec3::splat(v.truncate().element_sum() / 3.0),
+    }
+}
+
+fn grey(c: Vec3) -> f32 {
+    if c.x == c.y && c.y == c.z { c.x } else { luminance(c) }
 }
 
 fn index(names: &[u32], name: u32) -> Option<usize> {

@@ -105,6 +105,34 @@ def test_textures_of_every_type(dtype, channels):
     np.testing.assert_allclose(render.read_pass("Albedo")[6, 8], 0.2, rtol=1e-3)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_bump_maps_have_the_normal_of_the_raised_surface(size):
+    """Heights that rise by 0.25 along u and by 0.5 along v, on a square of 2 x 4."""
+    v, u = np.mgrid[0:32, 0:32] / 32.0
+    ramp = (0.25 * u - 0.5 * v).astype(np.float32)
+    scene = segue.Scene()
+    image = scene.add_image("ramp", ramp, "raw")
+    heights = scene.add_texture("heights", {"type": "image", "image": image})
+    bump = {"height": {"texture": heights}, "distance": 2.0 * size}
+    surface = {"type": "diffuse", "normal": bump}
+    material = scene.add_material("material", {"surface": surface})
+    uv = segue.Attribute("st", [[0, 0], [1, 0], [1, 1], [0, 1]], "corner")
+    square = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
+    mesh = scene.add_mesh("square", square, [0, 1, 2, 3], [4], attributes=[uv])
+    stretched = np.diag([2 * size, 4 * size, size, 1.0])
+    scene.add_instances("square", mesh, stretched, [material])
+    scene.add_light("sky", {"type": "dome", "radiance": [1, 1, 1]})
+    camera = np.eye(4)
+    camera[2, 3] = 3 * size
+    scene.set_camera("camera", {**CAMERA, "transform": camera.ravel().tolist()})
+    render = segue.Render(scene, settings(passes=["Normal"], integrator="path"))
+    render.run()
+    found = render.read_pass("Normal")[6, 8]
+    # slopes are 2 * 0.25 / 2 and 2 * 0.5 / 4
+    expected = np.array([-0.25, -0.25, 1.0]) / np.linalg.norm([0.25, 0.25, 1.0])
+    np.testing.assert_allclose(found[:3], expected, atol=1e-3)
+
+
 def test_instances_and_left_handed_meshes():
     scene = lit_scene(left_handed=True)
     render = segue.Render(scene, settings(passes=["Combined", "Normal"]))

@@ -40,7 +40,7 @@ def indices(full: bool) -> Rows:
 
 @case(GROUP, "0.75: emission over what is absorbed")
 def immersed(full: bool) -> Rows:
-    """A glowing furnace through a single sheet of glass, from inside of glass, and with its lamps inside of glass."""
+    """A glowing furnace through a sheet of glass, from inside of glass, and with lamps in it."""
     glowing = {"type": "emission", "color": [1, 1, 1], "strength": 0.3}
     wall = {"type": "add", "a": glowing, "b": {"type": "diffuse", "color": 0.6}}
 

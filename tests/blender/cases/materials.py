@@ -342,8 +342,15 @@ def case_normal_map() -> None:
     bump = tree.node("Bump")
     tree.link(normal.outputs[0], bump.inputs["Normal"])
     tree.link(bump.outputs[0], diffuse.inputs["Normal"])
-    surface, _, warnings = tree.export()
-    assert "normal" in surface and any("bump" in text for text in warnings)
+    assert tree.export()[0]["normal"]["space"] == "tangent", "no height: the map below"
+    tree.link(node.outputs["Color"], bump.inputs["Height"])
+    bump.inputs["Distance"].default_value, bump.inputs["Strength"].default_value = 0.1, 0.5
+    bump.invert = True
+    surface, scene, warnings = tree.export()
+    found = surface["normal"]
+    assert scene.textures[found["height"]["texture"]][1]["type"] == "image" and not warnings
+    _close((found["distance"], found["strength"]), (-0.1, 0.5))
+    assert found["normal"]["space"] == "tangent"
 
 
 def case_constants_are_folded() -> None:

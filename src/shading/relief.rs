@@ -1,0 +1,72 @@
+//! Shading frames: the mesh's normal, or what a normal map or a bump map makes of it.
+
+use super::material::Materials;
+use super::surface::{SurfacePoint, normal_matrix, normalize_any};
+use crate::math::Frame;
+use crate::scene::relief::{BumpMap, NormalMap, NormalSpace, Relief};
+use glam::{Mat3, Vec3};
+
+impl Materials {
+    /// The shading frame.
+    pub(super) fn frame(&self, relief: Option<&Relief>, p: &SurfacePoint) -> Frame {
+        Frame::from_normal(relief.map_or(p.ns, |relief| self.relief(relief, p)))
+    }
+
+    /// The shading frame with its x axis along the u direction of the first UV set.
+    pub(super) fn tangent_frame(&self, relief: Option<&Relief>, p: &SurfacePoint) -> Frame {
+        let n = relief.map_or(p.ns, |relief| self.relief(relief, p));
+        let tangent = self.textures.uv_set("", p.at.mesh).map_or(Vec3::ZERO, |i| p.tangent(&self.scene, i));
+        Frame::from_normal_tangent(n, tangent)
+    }
+
+    fn relief(&self, relief: &Relief, p: &SurfacePoint) -> Vec3 {
+        match relief {
+            Relief::Normals(map) => self.mapped_normal(map, p),
+            Relief::Heights(map) => self.bumped_normal(map, p),
+        }
+    }
+
+    fn mapped_normal(&self, map: &NormalMap, p: &SurfacePoint) -> Vec3 {
+        let v = self.textures.lookup(map.texture, &p.at).truncate();
+        let n = match map.space {
+            NormalSpace::World => v,
+            NormalSpace::Object => {
+                let m = Mat3::from(self.scene.instances[p.instance as usize].to_world.matrix3);
+                normal_matrix(m) * v
+            }
+            NormalSpace::Tangent => {
+                let Some(set) = self.textures.uv_set(&map.uv, p.at.mesh) else { return p.ns };
+                let tangent = p.tangent(&self.scene, set);
+                if tangent == Vec3::ZERO {
+                    return p.ns;
+                }
+                let f = Frame::from_normal_tangent(p.ns, tangent);
+                let bitangent = if p.uv_is_mirrored(&self.scene, set) { -f.t } else { f.t };
+                f.s * v.x + bitangent * v.y + f.n * v.z
+            }
+        };
+        let n = normalize_any(n);
+        blended(p.ns, n, self.textures.number(&map.strength, &p.at))
+    }
+
+    /// The surface's gradient of Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU", along the edges of the triangle.
+    fn bumped_normal(&self, map: &BumpMap, p: &SurfacePoint) -> Vec3 {
+        let n = map.normal.as_ref().map_or(p.ns, |below| self.relief(below, p));
+        let slopes = self.textures.slopes(&map.height, &p.at);
+        let [e1, e2] = p.edges(&self.scene);
+        // lengths are about one, so that products of those of small triangles are not zero
+        let scale = e1.abs().max(e2.abs()).max_element();
+        let [e1, e2] = [e1, e2].map(|e| e / scale);
+        let (across_2, across_1) = (e2.cross(n), n.cross(e1));
+        let det = e1.dot(across_2);
+        let rise = slopes * (self.textures.number(&map.distance, &p.at) / scale * 1f32.copysign(det));
+        let leaned = normalize_any(n * det.abs() - across_2 * rise.x - across_1 * rise.y);
+        blended(n, leaned, self.textures.number(&map.strength, &p.at))
+    }
+}
+
+/// Between two unit normals, or beyond the second.
+fn blended(n: Vec3, other: Vec3, strength: f32) -> Vec3 {
+    let between = normalize_any(n + (other - n) * strength.max(0.0));
+    if between == Vec3::ZERO { n } else { between }
+}
