@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -24,10 +24,10 @@ from segue import Render, Scene, usd
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers" / "usd"
 KEPT = ROOT / "results" / "agreement"
-SECONDS = float(os.environ.get("SEGUE_SECONDS", "0.85"))
-SEEDS, BLOCK = 6, 8
+SECONDS = float(os.environ.get("SEGUE_SECONDS", "2"))
+SEEDS, BLOCK = 6, 24
 #: Pictures of the gallery, and of the shared scenes, which are square.
-WIDE, SQUARE = (96, 54), (64, 64)
+WIDE, SQUARE = (288, 162), (192, 192)
 UNBIASED = ("path", "light", "bdpt")
 BIASED = (
     *("segment", "mvf", "photon-filter", "segment-bridge", "segment-path"),
@@ -44,14 +44,14 @@ LIMIT = 0.005
 FALSE_ALARM = 0.01
 #: A standard error is at least so many times the largest contribution.
 CHUNKS = 3.0
-#: Gathers photons and does nothing else: their light comes in portions that are larger the smaller the kernel.
-GATHERS = "ppm"
+#: Gather photons: their light comes in portions that are larger the smaller the kernel.
+GATHERS = ("ppm", "bpm", "photon-filter")
 #: Roughness from which lobes are no Dirac ones.
 ROUGH = 0.02
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 #: Parts of a picture: all, and what shows no mirror and no smooth glass.
 ALL, CLEAR = 0, 1
-CANNOT, CHANCE = "cannot find", "by chance"
+CANNOT, CHANCE, SHRINKS = "cannot find", "by chance", "shrinks"
 HEAD = f"""# Do the methods agree?
 
 Mean luminance of pictures of {WIDE[0]} × {WIDE[1]} (gallery) and {SQUARE[0]} × {SQUARE[1]} pixels (scenes shared with other renderers), by `benches/agreement.py`: {SEEDS} seeds for every method,
@@ -62,18 +62,18 @@ reflection, which is as noisy for all methods, and light tracing is complete.
 **Standard errors** are the largest of three: by the scatter of the {SEEDS} seeds' means; by that of the pixels as if these were independent, times how much more seeds scatter than this lets expect, on
 average over the scenes for the same method and kernel; and {CHUNKS:g} times the most that one pixel of one seed brings to the mean. The second is there since the first, from so few seeds, is
 often much too small by accident. The third, since scatter knows only of light that came: where a mean is made of few bright events, some as bright may well not have happened yet, and what has met
-but a few of them must not pass for precise. `{GATHERS}` has nothing but photons, and small kernels meet few: what one brings at {KERNELS[0]:.2f} pixels counts at {KERNELS[-1]:g} as well, as much brighter as
+but a few of them must not pass for precise. {", ".join(f"`{m}`" for m in GATHERS)} gather photons, and small kernels meet few: what one brings at {KERNELS[0]:.2f} pixels counts at {KERNELS[-1]:g} as well, as much brighter as
 the kernel is smaller. What has met none cannot be told from its own pictures, and may be said to differ where it only had bad luck.
 
 **Verdicts.** *agrees*: within {LIMIT:.1%} or two standard errors, which are at most {LIMIT:.1%}. *differs*: beyond {LIMIT:.1%} and beyond as many standard errors as one table in a hundred
-reaches by accident. *{CANNOT}*: the same, too dark, and the method does not make all paths: `light` sees nothing rough in mirrors or behind smooth glass; `path` and `mvf` do not meet
+reaches by accident. *{SHRINKS}*: the same, but the smaller kernel's deviation is less, by two of its standard errors, and does not differ: the larger kernel's is the price of its size. *{CANNOT}*: the same, too dark, and the method does not make all paths: `light` sees nothing rough in mirrors or behind smooth glass; `path` and `mvf` do not meet
 lights without extent (points, a sun of no size) through mirrors or smooth glass, nor does `bdpt` if that is seen through such again. *too noisy to say*: all else; *{CHANCE}* where the
 method finds those same paths for lights of some extent, if one happens to run into the light.
 """
 PAIRS = """
 ## Unbiased methods
 
-z-tests of each against each other: of the mean, and of the means of blocks of 8 × 8 pixels, of which the worst is told. One table in a hundred has by accident a mean beyond {mean:.1f} or a block
+z-tests of each against each other: of the mean, and of the means of blocks of {side} × {side} pixels, of which the worst is told. One table in a hundred has by accident a mean beyond {mean:.1f} or a block
 beyond {block:.1f}; what is beyond these *differs*.
 
 | scene | part | methods | first over second | z | worst block | |
@@ -280,10 +280,9 @@ def lend(places: list[Place]) -> None:
         excess = max(float(np.mean([row.excess() for row in alike])), 1.0)
         for row in alike:
             row.variance = (excess * np.array(row.variance)).tolist()
-    wide, narrow = (ROWS.index((GATHERS, kernel)) for kernel in KERNELS)
     brighter = (KERNELS[0] / KERNELS[-1]) ** 2
-    for place in places:
-        small, large = place.rows[narrow], place.rows[wide]
+    for place, method in product(places, GATHERS):
+        large, small = (place.rows[ROWS.index((method, k))] for k in KERNELS)
         chunks = zip(small.chunk, large.chunk, strict=True)
         small.chunk = [max(own, brighter * other) for own, other in chunks]
 
@@ -303,6 +302,13 @@ def verdict(off: float, error: float, most: float, weakness: str) -> str:
     return "too noisy to say" + (f", {CHANCE}" if weakness == CHANCE else "")
 
 
+def shrinks(found: list[tuple[float, float, str]]) -> bool:
+    """Whether the deviation of the larger kernel is that of its size: the smaller one's is less beyond accident, and passes."""
+    (large, _, told), (small, error, small_told) = found[0], found[-1]
+    is_less = abs(small) + 2.0 * error < abs(large)
+    return told == "differs" and small_told != "differs" and is_less
+
+
 def pairs(parts: list[Part], said: Counter[str]) -> str:
     """The section of unbiased methods; counts the verdicts."""
     tests = [
@@ -310,7 +316,7 @@ def pairs(parts: list[Part], said: Counter[str]) -> str:
     ]
     blocks = sum(len(part.place.rows[0].variance[ALL]) for part, _, _ in tests)
     most = {"mean": threshold(len(tests)), "block": threshold(blocks)}
-    text = PAIRS.format(**most)
+    text = PAIRS.format(side=BLOCK, **most)
     for part, i, j in tests:
         off, error, z, worst = part.against(i, j)
         told = "passes" if error <= LIMIT else "too noisy to say"
@@ -334,11 +340,16 @@ def kernels(parts: list[Part], said: Counter[str]) -> str:
             if method in UNBIASED and weakness != CANNOT:
                 continue
             cells = [*part.cells, f"`{method}`"]
+            found = []
             for number in (k for k, row in enumerate(ROWS) if row[0] == method):
                 own, own_error = part.place.rows[number].estimate(part.part)
                 off, off_error = own / mean - 1.0, np.hypot(own_error, error) / mean
                 told = verdict(off, off_error, most, weakness)
                 told = "stands in" if joins and number == STAND_IN else told
+                found.append((off, off_error, told))
+            if shrinks(found):
+                found[0] = (*found[0][:2], SHRINKS)
+            for off, off_error, told in found:
                 said[told] += 1
                 cells.append(f"{off:+.2%} ± {off_error:.2%}, {told}")
             text += f"| {' | '.join(cells)} |{' |' * (5 - len(cells))}\n"

@@ -109,8 +109,8 @@ SHADERS: dict[str, Shader] = {
 # that share what is below them would become billions. Surfaces that make sense stay far below.
 _MOST_SHADERS = 256
 
-# Below this roughness microfacets scatter less than a hundredth of the light more than once.
-_VISIBLY_ROUGH = 0.3
+# Closures whose microfacets may lose what they scatter more than once. Refraction always does.
+_MICROFACETS = ("glossy", "glass", "principled")
 
 # Shaders without a counterpart: the closure that comes nearest, and how that is said.
 _NEAREST: dict[str, tuple[str, str]] = {
@@ -222,6 +222,8 @@ class ClosureTranslator:
             normal = self._normal(socket(node, identifier), stack)
             if normal is not None:
                 result[key] = normal
+        if shader.closure in _MICROFACETS and getattr(node, "distribution", "") != "MULTI_GGX":
+            result["multiscatter"] = False
         self._warn_ignored(node, shader, stack)
         for color, strength in (("color", "strength"), ("emission_color", "emission_strength")):
             if strength in values:
@@ -279,24 +281,6 @@ class ClosureTranslator:
             self.ev.value(socket(node, "Roughness"), stack) != Constant.number(0.0)
         ):
             self.ev.warn(node, f"the {node.distribution.title()} distribution", "GGX is used")
-        if self._loses_light(node, stack):
-            self.ev.warn(node, "GGX that scatters once only", "Multiscatter GGX is used")
-
-    def _loses_light(self, node: bpy.types.Node, stack: Stack) -> bool:
-        """Whether the microfacets of a node visibly lose what they would scatter more than once."""
-        if (
-            getattr(node, "distribution", "") != "GGX"
-            or node.bl_idname == "ShaderNodeBsdfRefraction"
-        ):
-            return False
-        rough = self.ev.value(socket(node, "Roughness"), stack)
-        if isinstance(rough, Constant) and rough.rgb[0] < _VISIBLY_ROUGH:
-            return False
-        # What a varnish of low reflectance loses is little.
-        weights = [socket(node, name) for name in ("Metallic", "Transmission Weight")]
-        return node.bl_idname != "ShaderNodeBsdfPrincipled" or any(
-            self.ev.value(weight, stack) != Constant.number(0.0) for weight in weights
-        )
 
     def _normal(self, entry: bpy.types.NodeSocket | None, stack: Stack) -> dict[str, Any] | None:
         """The normal or bump map at a Normal input; None for the surface's own normal."""

@@ -22,6 +22,9 @@ const fn eight_tenths() -> Value {
 const fn half() -> Value {
     Value::number(0.5)
 }
+const fn yes() -> bool {
+    true
+}
 const fn one() -> Value {
     Value::number(1.0)
 }
@@ -82,6 +85,9 @@ pub struct PrincipledClosure {
     pub emission_strength: Value,
     #[serde(default)]
     pub metal_f90: MetalEdge,
+    /// Whether what microfacets scatter more than once comes out; the coat's always does.
+    #[serde(default = "yes")]
+    pub multiscatter: bool,
     pub normal: Option<Relief>,
 }
 
@@ -108,6 +114,8 @@ pub enum Closure {
         anisotropy: Value,
         #[serde(default = "zero")]
         rotation: Value,
+        #[serde(default = "yes")]
+        multiscatter: bool,
         normal: Option<Relief>,
     },
     /// Dielectric interface: reflection and refraction.
@@ -118,6 +126,8 @@ pub enum Closure {
         roughness: Value,
         #[serde(default = "glass_ior")]
         ior: Value,
+        #[serde(default = "yes")]
+        multiscatter: bool,
         normal: Option<Relief>,
     },
     /// Refraction without reflection.
@@ -335,6 +345,7 @@ impl Closure {
                     emission_color,
                     emission_strength,
                     metal_f90: _,
+                    multiscatter: _,
                     normal: _,
                 } = &**p;
                 [base_color, diffuse_roughness, metallic, roughness, ior, specular_level, specular_tint]

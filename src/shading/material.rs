@@ -119,7 +119,7 @@ impl Materials {
                     ),
                 }
             }
-            Closure::Glossy { color: c, roughness, anisotropy, rotation, normal } => {
+            Closure::Glossy { color: c, roughness, anisotropy, rotation, multiscatter, normal } => {
                 let anisotropy = number(anisotropy);
                 let ggx = grain(number(roughness), anisotropy);
                 let frame = match anisotropy == 0.0 {
@@ -127,11 +127,14 @@ impl Materials {
                     false => self.tangent_frame(normal.as_ref(), p).turned(number(rotation)),
                 };
                 let fresnel = Fresnel::constant(color(c).min(Vec3::ONE));
-                builder.push(weight, frame, Lobe::Reflection(Reflection::new(ggx, fresnel)));
+                let lobe = Reflection::new(ggx, fresnel);
+                let lobe = if *multiscatter { lobe } else { lobe.scattering_once() };
+                builder.push(weight, frame, Lobe::Reflection(lobe));
             }
-            Closure::Glass { color: c, roughness, ior, normal } => {
+            Closure::Glass { color: c, roughness, ior, multiscatter, normal } => {
                 let ggx = Ggx::from_roughness(number(roughness));
                 let lobe = Dielectric::new(ggx, sane_ior(number(ior)));
+                let lobe = if *multiscatter { lobe } else { lobe.scattering_once() };
                 builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Dielectric(lobe));
             }
             Closure::Refraction { color: c, roughness, ior, normal } => {
@@ -207,6 +210,7 @@ impl Materials {
                 MetalEdge::White => MetalF90::White,
                 MetalEdge::Base => MetalF90::Base,
             },
+            multiscatter: c.multiscatter,
         };
         model.push(builder, weight, frame, coat_frame);
     }

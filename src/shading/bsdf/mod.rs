@@ -32,7 +32,7 @@ use smallvec::SmallVec;
 pub enum Walk {
     /// From the camera: the known direction is `wo`, and radiance is carried.
     Camera,
-    /// From a light: the known direction is `wi`, and flux per unit of étendue's `dA dw_perp` is carried.
+    /// From a light: the known direction is `wi`, and flux of basic radiance, per `dA dw_perp`, is carried.
     Light,
 }
 

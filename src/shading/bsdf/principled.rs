@@ -64,6 +64,8 @@ pub struct Principled {
     pub sheen_tint: Vec3,
     /// What the metal reflects at grazing angles.
     pub metal_f90: MetalF90,
+    /// Whether what microfacets below the coat scatter more than once comes out.
+    pub multiscatter: bool,
 }
 
 /// Largest normal reflectance from which a refractive index is computed.
@@ -88,8 +90,7 @@ impl Principled {
             false => (Ggx::anisotropic(self.roughness, self.anisotropy), frame.turned(self.rotation)),
         };
         if self.metallic > 0.0 {
-            let lobe = Reflection::new(grain.0, self.metal());
-            builder.push(weight * self.metallic, grain.1, Lobe::Reflection(lobe));
+            builder.push(weight * self.metallic, grain.1, self.reflection(grain.0, self.metal()));
             weight *= 1.0 - self.metallic;
         }
         if self.transmission > 0.0 {
@@ -100,8 +101,7 @@ impl Principled {
             return;
         }
         if let Some(fresnel) = self.specular() {
-            let lobe = Lobe::Reflection(Reflection::new(grain.0, fresnel));
-            weight *= builder.push_layer(weight, Vec3::ONE, grain.1, lobe);
+            weight *= builder.push_layer(weight, Vec3::ONE, grain.1, self.reflection(grain.0, fresnel));
         }
         self.push_diffuse(builder, weight, frame);
     }
@@ -129,11 +129,17 @@ impl Principled {
         }
     }
 
+    fn reflection(&self, ggx: Ggx, fresnel: Fresnel) -> Lobe {
+        let lobe = Reflection::new(ggx, fresnel);
+        Lobe::Reflection(if self.multiscatter { lobe } else { lobe.scattering_once() })
+    }
+
     fn glass(&self) -> Dielectric {
         let f0 = (f0_from_ior(self.ior) * self.specular_tint).min(Vec3::ONE);
         // light that goes in and comes out again is tinted twice
         let tint = self.base_color.map(f32::sqrt);
-        Dielectric::tinted(Ggx::from_roughness(self.roughness), self.ior, f0, Vec3::ONE, tint)
+        let lobe = Dielectric::tinted(Ggx::from_roughness(self.roughness), self.ior, f0, Vec3::ONE, tint);
+        if self.multiscatter { lobe } else { lobe.scattering_once() }
     }
 
     /// The dielectric reflection over the diffuse body, where there is one.

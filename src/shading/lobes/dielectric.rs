@@ -77,6 +77,14 @@ impl Dielectric {
         Self { ggx, eta, split: Split::Fresnel { loss, f0, reflection, transmission } }
     }
 
+    /// The same, losing what is scattered more than once.
+    pub fn scattering_once(mut self) -> Self {
+        if let Split::Fresnel { loss, .. } = &mut self.split {
+            *loss = None;
+        }
+        self
+    }
+
     /// Refraction without Fresnel reflection; light that would be totally reflected is absorbed, and
     /// what a rough surface scatters more than once is lost.
     pub fn refraction_only(ggx: Ggx, eta: f32) -> Self {

@@ -24,6 +24,11 @@ impl Reflection {
         Self { ggx, fresnel, scale: ReflectionScale::new(&ggx), regained }
     }
 
+    /// The same, losing what is scattered more than once.
+    pub fn scattering_once(self) -> Self {
+        Self { regained: Vec3::ZERO, ..self }
+    }
+
     #[inline]
     pub(super) fn is_delta(&self) -> bool {
         self.ggx.is_smooth()

@@ -262,6 +262,20 @@ def case_white_metals_reflect_all_light() -> None:
         assert abs(ball_mean - 1.0) < 0.01
 
 
+def case_microfacets_that_scatter_once_lose_as_much_light() -> None:
+    for kind, inputs in (
+        ("BsdfAnisotropic", {"Color": (0.9, 0.8, 0.7, 1), "Roughness": 0.9}),
+        ("BsdfPrincipled", {"Base_Color": (0.9, 0.6, 0.3, 1), "Metallic": 1.0, "Roughness": 0.8}),
+        ("BsdfGlass", {"Roughness": 0.6, "IOR": 1.5}),
+    ):
+        _stage(kind, inputs)
+        tree = bpy.data.materials["Tested"].node_tree
+        next(n for n in tree.nodes if n.bl_idname == f"ShaderNode{kind}").distribution = "GGX"
+        found = agreement.compare(*agreement.render_both(64, 48, 256, 256))
+        print(kind)
+        _check(found, mean=0.007, blocks=0.015, correlation=0.999)
+
+
 def case_bump_maps_look_alike() -> None:
     """Waves of a picture in metal and, inverted, in plaster, scaled unevenly."""
     v, u = np.mgrid[0:128, 0:128] / 128.0

@@ -28,6 +28,7 @@ fn white() -> Principled {
         sheen_roughness: 0.5,
         sheen_tint: Vec3::ONE,
         metal_f90: MetalF90::White,
+        multiscatter: true,
     }
 }
 
