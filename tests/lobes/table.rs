@@ -49,6 +49,7 @@ pub fn rows() -> Vec<Row> {
             }
             Lobe::Sheen(_) => {
                 rows.extend(sheens());
+                rows.extend(scattering_once());
                 None
             }
         };
@@ -94,8 +95,6 @@ fn reflections() -> Vec<Row> {
         let lobe = Lobe::Reflection(Reflection::new(Ggx::from_roughness(0.6), fresnel));
         rows.push(row(&format!("reflection {name}"), lobe, false, true, 0.36));
     }
-    let once = Reflection::new(Ggx::from_roughness(0.8), white).scattering_once();
-    rows.push(row("reflection once", Lobe::Reflection(once), false, true, 0.64));
     rows
 }
 
@@ -121,13 +120,21 @@ fn dielectrics() -> Vec<Row> {
     let tint = Vec3::new(0.9, 0.5, 0.2);
     let tinted = Dielectric::tinted(Ggx::new(0.2, 0.2), 1.5, tint * 0.04, Vec3::ONE, tint);
     rows.push(row("dielectric tinted", Lobe::Dielectric(tinted), false, true, 0.2));
-    let once = Dielectric::new(Ggx::from_roughness(0.8), 1.5).scattering_once();
-    rows.push(row("dielectric once", Lobe::Dielectric(once), false, true, 0.64));
     for roughness in [1e-4f32, 0.3, 0.8] {
         let lobe = Lobe::Dielectric(Dielectric::refraction_only(Ggx::from_roughness(roughness), 1.45));
         rows.push(row(&format!("refraction {roughness}"), lobe, false, true, roughness * roughness));
     }
     rows
+}
+
+fn scattering_once() -> Vec<Row> {
+    let rough = Ggx::from_roughness(0.8);
+    let reflection = Reflection::new(rough, Fresnel::constant(Vec3::ONE)).scattering_once();
+    let dielectric = Dielectric::new(rough, 1.5).scattering_once();
+    vec![
+        row("reflection once", Lobe::Reflection(reflection), false, true, 0.64),
+        row("dielectric once", Lobe::Dielectric(dielectric), false, true, 0.64),
+    ]
 }
 
 fn oren_nayars() -> Vec<Row> {
