@@ -6,7 +6,8 @@
 //!
 //! The `r` of the denominator cannot be the pixel itself: where it happens to be dark the quotient explodes.
 //! It is the mean of the pixel's neighbours (not of itself: one far too bright sample would hide the error that it
-//! tells of; of a wider neighbourhood where such samples are so rare that the nearest ones happen to have none), drawn back to the pixel where that differs from its
+//! tells of; of a wider neighbourhood where such samples are so rare that the nearest ones happen to have none; of one half
+//! alone where such a sample fell into the other and a kernel spread it over all of them), drawn back to the pixel where that differs from its
 //! neighbours by more than noise explains (the local linear estimator of J.-S. Lee, "Digital Image
 //! Enhancement and Noise Filtering by Use of Local Statistics", 1980).
 
@@ -22,13 +23,15 @@ const RADIUS: usize = 2;
 const WIDER: [usize; 3] = [16, 64, 256];
 /// Relative standard error up to which a mean counts as known.
 const KNOWN: f64 = 0.5;
+/// Times the usual noise from which a difference of halves is a rare sample.
+const RARE: f64 = 10.0;
 
 /// A pixel that has been sampled at least twice.
 #[derive(Clone, Copy)]
 pub(super) struct Pixel {
     pub mean: Vec3,
-    /// Half the difference of the means of its halves: as far from zero as `mean` is from right.
-    pub apart: Vec3,
+    /// Means of its halves.
+    pub halves: [Vec3; 2],
     /// Estimated variance of `mean`.
     pub variance: Vec3,
 }
@@ -39,10 +42,11 @@ pub(super) fn of_pixel(tile: &Tile, pixel: usize) -> Option<Pixel> {
     let [n, m] = counts.map(f64::from);
     (m > 0.0).then(|| {
         // a difference of means has variance v/n + v/m, the mean of all v/(n + m)
-        let difference = even / n - odd / m;
+        let [even_mean, odd_mean] = [even / n, odd / m];
+        let difference = even_mean - odd_mean;
         Pixel {
             mean: ((even + odd) / (n + m)).as_vec3(),
-            apart: (0.5 * difference).as_vec3(),
+            halves: [even_mean, odd_mean].map(|half| half.as_vec3()),
             variance: (difference * difference * (n * m / ((n + m) * (n + m)))).as_vec3().min(Vec3::MAX),
         }
     })
@@ -52,18 +56,23 @@ pub(super) fn of_pixel(tile: &Tile, pixel: usize) -> Option<Pixel> {
 #[derive(Clone, Copy, Default)]
 struct Window {
     mean: DVec3,
-    apart: DVec3,
+    halves: [DVec3; 2],
+    squares: [DVec3; 2],
     variance: DVec3,
     count: f64,
 }
 
 impl From<&Option<Pixel>> for Window {
     fn from(pixel: &Option<Pixel>) -> Self {
-        pixel.map_or(Window::default(), |p| Window {
-            mean: p.mean.as_dvec3(),
-            apart: p.apart.as_dvec3(),
-            variance: p.variance.as_dvec3(),
-            count: 1.0,
+        pixel.map_or(Window::default(), |p| {
+            let halves = p.halves.map(Vec3::as_dvec3);
+            Window {
+                mean: p.mean.as_dvec3(),
+                halves,
+                squares: halves.map(|half| half * half),
+                variance: p.variance.as_dvec3(),
+                count: 1.0,
+            }
         })
     }
 }
@@ -72,7 +81,8 @@ impl Sum for Window {
     fn sum<I: Iterator<Item = Window>>(windows: I) -> Window {
         windows.fold(Window::default(), |a, b| Window {
             mean: a.mean + b.mean,
-            apart: a.apart + b.apart,
+            halves: [a.halves[0] + b.halves[0], a.halves[1] + b.halves[1]],
+            squares: [a.squares[0] + b.squares[0], a.squares[1] + b.squares[1]],
             variance: a.variance + b.variance,
             count: a.count + b.count,
         })
@@ -123,13 +133,26 @@ impl Surroundings {
         // an only pixel has itself alone; a difference may be below zero by rounding
         let others = if window.count > 1.0 { ((window.mean - mean) / count).max(DVec3::ZERO) } else { mean };
         // noise that neighbours share, as a kernel makes it, shows in the halves alone
-        let error = window.variance.powf(0.5).max(window.apart.abs()) / window.count;
-        Self {
+        let apart = 0.5 * (window.halves[0] - window.halves[1]).abs();
+        let error = window.variance.powf(0.5).max(apart) / window.count;
+        let both = Self {
             mean: others,
             variance: ((window.variance - variance) / count).max(DVec3::ZERO),
             count: DVec3::splat(count),
             is_known: error.cmple(KNOWN * others),
-        }
+        };
+        if both.is_known.all() { both } else { both.or(Self::of_darker_half(window)) }
+    }
+
+    /// By the half that is darker in all, known by how much its pixels differ.
+    fn of_darker_half(window: Window) -> Self {
+        let [even, odd] = window.halves.map(|sum| sum / window.count);
+        let is_even = even.cmplt(odd);
+        let mean = DVec3::select(is_even, even, odd);
+        let square = DVec3::select(is_even, window.squares[0], window.squares[1]) / window.count;
+        let variance = (square - mean * mean).max(DVec3::ZERO);
+        let is_known = (variance / window.count).powf(0.5).cmple(KNOWN * mean) & mean.cmpgt(DVec3::ZERO);
+        Self { mean, variance, count: DVec3::splat(window.count), is_known }
     }
 
     /// The same with the channels that are known, and those of a wider one.
@@ -176,10 +199,14 @@ fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64, wide
             }
         });
         let smooth = found.mean;
-        let (mean, variance) = (pixel.mean.as_dvec3(), pixel.variance.as_dvec3());
+        let mean = pixel.mean.as_dvec3();
         let excess = mean - smooth;
-        // one pixel's estimate of variance is often far too small
-        let noise = variance.max(found.variance);
+        // one pixel's own is often far too small
+        let own = pixel.halves.map(|half| (mean - half.as_dvec3()).abs());
+        let (own, usual) = (own[0].max(own[1]), found.variance.powf(0.5));
+        // what one half alone has seen is noise to the last bit, but for that of the other half
+        let is_rare = own.cmpgt(RARE * usual);
+        let noise = DVec3::select(is_rare, own + usual, own.max(usual)).powf(2.0);
         // share of the squared difference that noise does not explain; no difference, nothing to draw back
         let trust = (1.0 - noise / (excess * excess).max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO);
         let truth = smooth + trust * excess;
@@ -315,6 +342,31 @@ mod tests {
         }
     }
 
+    /// Where a kernel has spread a rare sample over a few pixels of a dark corner, the wider surroundings are too bright to judge by.
+    #[test]
+    fn a_bright_patch_in_the_dark_is_judged_by_the_half_without_it() {
+        let is_dark = |x: u32, y: u32| x < 40 && y < 30;
+        for n in [8, 33] {
+            let film = Film::new(SIZE.0, SIZE.1, PassSet::default()).unwrap();
+            let value = |x, y| if is_dark(x, y) { 0.02 } else { 1.0 };
+            for i in 0..n {
+                film.add_iteration(|x, y| {
+                    let in_patch = i == 2 && (10..16).contains(&x) && (12..18).contains(&y);
+                    let noise = 0.5 + hash_unit(hash(x, y), i);
+                    let radiance = Vec3::splat(value(x, y) * noise + if in_patch { 100.0 } else { 0.0 });
+                    Sample { radiance, alpha: 1.0, ..Default::default() }
+                });
+            }
+            let squares: f64 = film.rect().pixels().map(|(x, y)| f64::from(value(x, y)).powi(2)).sum();
+            let pixels = f64::from(SIZE.0 * SIZE.1);
+            let floor = 1e-4 * squares / pixels;
+            let patch = 36.0 * (100.0 / f64::from(n)).powi(2) / (0.02f64.powi(2) + floor);
+            let expected = patch / pixels + 1.0 / (12.0 * f64::from(n));
+            let ratio = film.estimated_error(Hints::default()).unwrap().noise / expected;
+            assert!((0.7..1.4).contains(&ratio), "{n}: {ratio}");
+        }
+    }
+
     #[test]
     fn edges_and_thin_lines_are_not_smoothed_away() {
         check("edges", edges, Noise::Uniform, |_, _| 16);
@@ -356,7 +408,11 @@ mod tests {
     #[test]
     fn a_bright_pixel_leaves_no_trace_beyond_its_neighbourhood() {
         let pixel = |value, variance| {
-            Some(Pixel { mean: Vec3::splat(value), apart: Vec3::ZERO, variance: Vec3::splat(variance) })
+            Some(Pixel {
+                mean: Vec3::splat(value),
+                halves: [Vec3::splat(value); 2],
+                variance: Vec3::splat(variance),
+            })
         };
         let mut row = vec![pixel(0.1, 0.01); 40];
         row[..8].fill(None);
