@@ -9,7 +9,7 @@ import numpy as np
 
 from ..log import ExportLog
 from ..nodes.material import Translator
-from ..nodes.values import AttributeValue, Constant, ImageValue, negative
+from ..nodes.values import AttributeValue, Constant, ImageValue, Value, negative
 from .lights import ALL_BOUNCES
 
 # Columns: where the axes of the ABI's dome lie in Blender's world. Blender's map has +X in its
@@ -26,19 +26,30 @@ _RAY_FLAGS = {
 
 def world_json(
     world: bpy.types.World | None, translator: Translator, log: ExportLog
-) -> dict[str, Any] | None:
-    """The dome light of a world; None for a black one."""
+) -> list[dict[str, Any]]:
+    """The dome light of a world, and a second where the camera sees another; none is black."""
     if world is None:
-        return None
+        return []
     if not world.use_nodes or world.node_tree is None:
-        value = Constant.color(world.color)
+        values: list[Value] = [Constant.color(world.color)]
     else:
-        value = translator.world_radiance(world)
+        values = translator.world_radiance(world)
+    visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
+    seen = [{"camera_visible": visible}]
+    if len(values) > 1:
+        seen = [{"camera_visible": False}, {"camera_only": True}]
+    domes = [_dome(world, value, translator, log) for value in values[: 1 + int(visible)]]
+    return [dome | by for dome, by in zip(domes, seen, strict=False) if dome]
+
+
+def _dome(
+    world: bpy.types.World, value: Value, translator: Translator, log: ExportLog
+) -> dict[str, Any] | None:
+    """A dome of this radiance."""
     name = f"World '{world.name}'"
     if negative(value):
         log.warn(f"{name}: negative light is not supported, that part is left out")
-    visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
-    result: dict[str, Any] = {"type": "dome", "camera_visible": visible}
+    result: dict[str, Any] = {"type": "dome"}
     if isinstance(value, ImageValue):
         if value.gain <= 0.0:
             return None
@@ -95,12 +106,11 @@ def export_world(
     if not view_layer.use_sky:
         return
     world = getattr(view_layer, "world_override", None) or depsgraph.scene_eval.world
-    data = world_json(world, translator, log)
-    if data is None:
-        return
-    scene.add_light(world.name, data)
-    seen = data["camera_visible"] and not depsgraph.scene_eval.render.film_transparent
-    if seen and view_layer.use_pass_emit:
+    domes = world_json(world, translator, log)
+    for dome in domes:
+        scene.add_light(world.name, dome)
+    is_seen = any(dome.get("camera_visible", True) for dome in domes)
+    if is_seen and not depsgraph.scene_eval.render.film_transparent and view_layer.use_pass_emit:
         log.warn(
             f"View layer '{view_layer.name}': the Emission pass holds the background of the world "
             "too, which Cycles keeps in the Environment pass"

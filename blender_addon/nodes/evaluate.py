@@ -50,12 +50,22 @@ class Evaluator:
     """Evaluates one node tree. `owner` names its material, world or light in warnings."""
 
     def __init__(
-        self, owner: str, textures: TextureStore, log: ExportLog, *, world: bool = False
+        self,
+        owner: str,
+        textures: TextureStore,
+        log: ExportLog,
+        *,
+        world: bool = False,
+        camera: bool | None = None,
     ) -> None:
+        """`camera`: whether it is for rays from the camera, where these are told from others."""
         self.owner = owner
         self.textures = textures
         self.log = log
         self.world = world
+        self.camera = camera
+        #: Whether a value depends on that.
+        self.tells_camera = False
         self._memo: dict[tuple, Value] = {}
 
     def warn(self, node: bpy.types.Node, what: str, instead: str) -> None:

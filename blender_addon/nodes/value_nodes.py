@@ -46,6 +46,15 @@ def _number(
     return Constant.number(output.default_value)
 
 
+def _light_path(
+    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+) -> Value:
+    if ev.camera is None or output.identifier != "Is Camera Ray":
+        raise UnsupportedError(f"the output '{output.name}'")
+    ev.tells_camera = True
+    return Constant.number(float(ev.camera))
+
+
 def _image(
     ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
 ) -> Value:
@@ -299,4 +308,5 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeCombineXYZ": _combine,
     "ShaderNodeBlackbody": _blackbody,
     "ShaderNodeLightFalloff": _falloff,
+    "ShaderNodeLightPath": _light_path,
 }

@@ -23,8 +23,10 @@ const RADIUS: usize = 2;
 const WIDER: [usize; 3] = [16, 64, 256];
 /// Relative standard error up to which a mean counts as known.
 const KNOWN: f64 = 0.5;
-/// Times the usual noise from which a difference of halves is a rare sample.
+/// Times as bright as the other from which a half has seen what is rare.
 const RARE: f64 = 10.0;
+/// Pixels over which a kernel spreads a sample, at least.
+const SPREAD: f64 = 3.0;
 
 /// A pixel that has been sampled at least twice.
 #[derive(Clone, Copy)]
@@ -124,6 +126,8 @@ struct Surroundings {
     count: DVec3,
     /// Whether the mean is known with the pixel's own noise in it: else what it shows is too rare to be judged by so few.
     is_known: BVec3,
+    /// Whether it is one half's, because the other is far too bright.
+    is_half: BVec3,
 }
 
 impl Surroundings {
@@ -140,19 +144,27 @@ impl Surroundings {
             variance: ((window.variance - variance) / count).max(DVec3::ZERO),
             count: DVec3::splat(count),
             is_known: error.cmple(KNOWN * others),
+            is_half: BVec3::FALSE,
         };
         if both.is_known.all() { both } else { both.or(Self::of_darker_half(window)) }
     }
 
-    /// By the half that is darker in all, known by how much its pixels differ.
+    /// By the half that is darker in all, known by how much its pixels differ, if the other has seen something rare.
     fn of_darker_half(window: Window) -> Self {
         let [even, odd] = window.halves.map(|sum| sum / window.count);
         let is_even = even.cmplt(odd);
         let mean = DVec3::select(is_even, even, odd);
         let square = DVec3::select(is_even, window.squares[0], window.squares[1]) / window.count;
         let variance = (square - mean * mean).max(DVec3::ZERO);
-        let is_known = (variance / window.count).powf(0.5).cmple(KNOWN * mean) & mean.cmpgt(DVec3::ZERO);
-        Self { mean, variance, count: DVec3::splat(window.count), is_known }
+        let is_calm = (variance / window.count).powf(0.5).cmple(KNOWN * mean) & mean.cmpgt(DVec3::ZERO);
+        let (other, other_square) = (
+            DVec3::select(is_even, odd, even) * window.count,
+            DVec3::select(is_even, window.squares[1], window.squares[0]),
+        );
+        let is_rare = other.cmpgt(RARE * mean * window.count);
+        let is_spread = (other * other).cmpgt(SPREAD * other_square);
+        let is_known = is_calm & is_rare & is_spread;
+        Self { mean, variance, count: DVec3::splat(window.count), is_known, is_half: is_known }
     }
 
     /// The same with the channels that are known, and those of a wider one.
@@ -163,6 +175,7 @@ impl Surroundings {
             variance: select(self.variance, wider.variance),
             count: select(self.count, wider.count),
             is_known: self.is_known | wider.is_known,
+            is_half: self.is_half | (wider.is_half & !self.is_known),
         }
     }
 }
@@ -201,14 +214,11 @@ fn row_scales(pixels: &[Option<Pixel>], width: usize, y: usize, floor: f64, wide
         let smooth = found.mean;
         let mean = pixel.mean.as_dvec3();
         let excess = mean - smooth;
-        // one pixel's own is often far too small
-        let own = pixel.halves.map(|half| (mean - half.as_dvec3()).abs());
-        let (own, usual) = (own[0].max(own[1]), found.variance.powf(0.5));
-        // what one half alone has seen is noise to the last bit, but for that of the other half
-        let is_rare = own.cmpgt(RARE * usual);
-        let noise = DVec3::select(is_rare, own + usual, own.max(usual)).powf(2.0);
+        // one pixel's estimate of variance is often far too small
+        let noise = pixel.variance.as_dvec3().max(found.variance);
         // share of the squared difference that noise does not explain; no difference, nothing to draw back
         let trust = (1.0 - noise / (excess * excess).max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO);
+        let trust = DVec3::select(found.is_half, DVec3::ZERO, trust);
         let truth = smooth + trust * excess;
         // one over the square of a noisy mean is too large by three of its relative variances
         let convexity = 3.0 * found.variance / found.count * (1.0 - trust);

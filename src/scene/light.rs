@@ -45,13 +45,35 @@ pub struct Shaping {
     pub profile: Profile,
 }
 
+/// Which rays see a light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SeenBy {
+    /// All.
+    All,
+    /// All but those from the camera.
+    AllButCamera,
+    /// Those from the camera alone: a backdrop, which sheds no light on anything.
+    CameraAlone,
+}
+
+impl SeenBy {
+    /// Whether a ray sees it.
+    pub fn includes(self, from_camera: bool) -> bool {
+        match self {
+            Self::All => true,
+            Self::AllButCamera => !from_camera,
+            Self::CameraAlone => from_camera,
+        }
+    }
+}
+
 /// A light in world space. Radiance is in W/(m^2 sr) per linear Rec.709 channel.
 #[derive(Clone, Debug)]
 pub struct Light {
     /// The name, for messages.
     pub name: String,
-    /// Whether camera rays see it.
-    pub camera_visible: bool,
+    /// Which rays see it.
+    pub seen_by: SeenBy,
     /// What emits.
     pub kind: LightKind,
 }

@@ -20,7 +20,7 @@ pub use camera::Camera;
 pub use error::{SceneError, Warnings};
 pub use image::Image;
 pub use instance::{Instance, InstanceGroup};
-pub use light::{Light, LightKind, LightSpec};
+pub use light::{Light, LightKind, LightSpec, SeenBy};
 pub use material::Material;
 pub use mesh::Mesh;
 pub use needs::Needs;

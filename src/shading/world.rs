@@ -347,7 +347,7 @@ impl World {
         let Piece { ray, direction, travelled } = *piece;
         let t_max = end.map_or(ray.t_max, |p| (p.place.position - ray.origin).dot(direction));
         self.emitters.for_each_hit(ray.origin, direction, t_max, |hit| {
-            if hit.distance >= ray.t_min && (!from_camera || self.emitters.camera_visible(hit.emitter)) {
+            if hit.distance >= ray.t_min && self.emitters.is_seen(hit.emitter, from_camera) {
                 let hit = EmitterHit { distance: travelled + hit.distance, ..hit };
                 found(LightPoint { radiance: hit.radiance, direction, hit });
             }
@@ -368,7 +368,7 @@ impl World {
         }
         let direction = piece.direction;
         self.emitters.for_each_infinite(piece.ray.origin, direction, |hit| {
-            if !from_camera || self.emitters.camera_visible(hit.emitter) {
+            if self.emitters.is_seen(hit.emitter, from_camera) {
                 found(LightPoint { radiance: hit.radiance, direction, hit });
             }
         });

@@ -3,7 +3,7 @@
 use super::support::*;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use segue::scene::light::{LightKind, LightSpec};
-use segue::scene::{Light, Warnings};
+use segue::scene::{Light, SeenBy, Warnings};
 
 fn place(json: &str) -> (Option<Light>, Vec<String>) {
     let spec = LightSpec::from_json("lamp", json).unwrap();
@@ -27,6 +27,7 @@ fn bad_descriptions_are_refused_by_name() {
         (r#"{"type":"sphere","radiance":[1,1]}"#, "length"),
         (r#"{"type":"sphere","radiance":[1,1,1],"transform":[1,2]}"#, "transform"),
         (r#"{"type":"sphere","radiance":[1,1,1],"camera_visible":3}"#, "camera_visible"),
+        (r#"{"type":"dome","radiance":[1,1,1],"camera_visible":false,"camera_only":true}"#, "camera_only"),
         (
             r#"{"type":"sphere","radiance":[1,1,1],"transform":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,1,1]}"#,
             "projective",
@@ -112,7 +113,7 @@ fn the_placed_light_is_where_the_transform_says() {
             "transform":[0,0,1,1e9, 0,1,0,2, -1,0,0,3, 0,0,0,1]}"#,
     )
     .unwrap();
-    assert_eq!((spec.image(), spec.camera_visible), (Some(7), false));
+    assert_eq!((spec.image(), spec.seen_by), (Some(7), SeenBy::AllButCamera));
     // a common origin is subtracted before single precision
     let relative = DAffine3::from_translation(-DVec3::new(1e9, 0.0, 0.0)) * spec.to_world;
     let light = spec.place(&relative, &mut Warnings::default()).unwrap().unwrap();

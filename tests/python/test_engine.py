@@ -133,6 +133,30 @@ def test_bump_maps_have_the_normal_of_the_raised_surface(size):
     np.testing.assert_allclose(found[:3], expected, atol=1e-3)
 
 
+@pytest.mark.parametrize("integrator", ["segment", "path", "vcm", "light", "photon-filter"])
+@pytest.mark.parametrize("light", [{"type": "dome"}, {"type": "rect", "width": 9, "height": 9}])
+def test_the_camera_alone_sees_backdrops(integrator, light):
+    for with_floor in (False, True):
+        scene = segue.Scene()
+        if with_floor:
+            add_square(scene)
+        else:
+            # something, that nothing is seen of
+            mesh = scene.add_mesh("far", SQUARE - [0, 0, 1e3], [0, 1, 2, 3], [4])
+            material = scene.add_material("m", {"surface": {"type": "diffuse"}})
+            scene.add_instances("far", mesh, np.eye(4), [material])
+        behind = np.diag([1.0, -1.0, -1.0, 1.0])
+        behind[2, 3] = -2
+        common = {"radiance": [1, 2, 4], "camera_only": True, "transform": behind.ravel().tolist()}
+        scene.add_light("backdrop", {**light, **common})
+        scene.set_camera("camera", CAMERA)
+        render = segue.Render(scene, settings(integrator=integrator))
+        render.run()
+        picture = render.read_pass("Combined")[..., :3]
+        middle = picture[5:7, 7:9].mean((0, 1))
+        np.testing.assert_allclose(middle, (0, 0, 0) if with_floor else (1, 2, 4), rtol=1e-3)
+
+
 def test_instances_and_left_handed_meshes():
     scene = lit_scene(left_handed=True)
     render = segue.Render(scene, settings(passes=["Combined", "Normal"]))

@@ -1,7 +1,7 @@
 //! Descriptions of lights: JSON, and what can be said against it before the light is placed.
 
-use super::Light;
 use super::placement::{Unplaceable, place};
+use super::{Light, SeenBy};
 use crate::scene::camera::affine_from_rows;
 use crate::scene::{SceneError, Warnings};
 use glam::{DAffine3, DMat4};
@@ -18,8 +18,8 @@ pub struct LightSpec {
     pub name: String,
     /// Light to world.
     pub to_world: DAffine3,
-    /// Whether camera rays see it.
-    pub camera_visible: bool,
+    /// Which rays see it.
+    pub seen_by: SeenBy,
     shape: Shape,
 }
 
@@ -105,10 +105,17 @@ impl LightSpec {
         }
         let mut map: Map<String, Value> = serde_json::from_str(json).map_err(|e| e.to_string())?;
         let rows = take(&mut map, "transform")?.unwrap_or(DMat4::IDENTITY.to_cols_array());
-        let camera_visible = take(&mut map, "camera_visible")?.unwrap_or(true);
+        let seen_by = match ["camera_visible", "camera_only"].map(|key| take(&mut map, key)) {
+            [visible, only] => match (visible?.unwrap_or(true), only?.unwrap_or(false)) {
+                (true, false) => SeenBy::All,
+                (false, false) => SeenBy::AllButCamera,
+                (true, true) => SeenBy::CameraAlone,
+                (false, true) => return Err("camera_only: nothing would see it, not even the camera".into()),
+            },
+        };
         let shape: Shape = serde_json::from_value(Value::Object(map)).map_err(|e| e.to_string())?;
         check(&shape)?;
-        Ok(Self { name: name.into(), to_world: affine_from_rows(&rows)?, camera_visible, shape })
+        Ok(Self { name: name.into(), to_world: affine_from_rows(&rows)?, seen_by, shape })
     }
 
     /// The image the light uses, by its index in the scene.
@@ -125,9 +132,7 @@ impl LightSpec {
         let object = || format!("light {:?}", self.name);
         let mut warn = |text: &str| warnings.add(object(), text, 1);
         match place(&self.shape, to_world, &mut warn) {
-            Ok(kind) => {
-                Ok(Some(Light { name: self.name.clone(), camera_visible: self.camera_visible, kind }))
-            }
+            Ok(kind) => Ok(Some(Light { name: self.name.clone(), seen_by: self.seen_by, kind })),
             Err(Unplaceable::Dark(reason)) => {
                 warn(&format!("dropped, it emits nothing: {reason}"));
                 Ok(None)

@@ -28,7 +28,7 @@ mod triangle_table;
 
 use crate::math::density::{AreaPdf, DiscreteProbability, EtenduePdf, SolidAnglePdf};
 use crate::math::distribution::AliasTable;
-use crate::scene::{Image, Light, SceneError, Warnings};
+use crate::scene::{Image, Light, SceneError, SeenBy, Warnings};
 use emitter::{Emitter, luminance64};
 use glam::{DVec3, Vec2, Vec3};
 use hit_tree::HitTree;
@@ -47,7 +47,7 @@ pub use triangle::MeshTriangle;
 #[derive(Debug)]
 pub struct Emitters {
     lights: Vec<Emitter>,
-    camera_visible: Vec<bool>,
+    seen_by: Vec<SeenBy>,
     triangles: Vec<Triangle>,
     table: TriangleTable,
     infinite: Vec<EmitterId>,
@@ -70,7 +70,8 @@ impl Emitters {
         bounds: SceneBounds,
         warnings: &mut Warnings,
     ) -> Result<Self, SceneError> {
-        let camera_visible = lights.iter().map(|l| l.camera_visible).collect();
+        let seen_by: Vec<SeenBy> = lights.iter().map(|l| l.seen_by).collect();
+        let shines = |i: u32| seen_by[i as usize] != SeenBy::CameraAlone;
         let lights = lights.iter().map(|l| Emitter::new(l, images)).collect::<Result<Vec<_>, _>>()?;
         let mut places = Vec::with_capacity(triangles.len());
         let mut kept = Vec::with_capacity(triangles.len());
@@ -85,23 +86,24 @@ impl Emitters {
             warnings.add("emissive meshes", "triangles without area or radiance do not emit", count);
         }
         let numbered = || (0..).zip(&lights);
-        let infinite: Vec<_> = numbered().filter_map(|(i, l)| l.infinite(EmitterId(i))).collect();
+        let far: Vec<_> = numbered().filter_map(|(i, l)| l.infinite(EmitterId(i))).collect();
         let shapes = numbered().filter(|(_, l)| l.is_hittable());
         let hittable = HitTree::new(shapes.filter_map(|(i, l)| l.bounds().map(|b| (i, b.min, b.max))));
         let first = lights.len() as u32;
-        let bounded = numbered().filter_map(|(i, l)| Some((i, l.bounds()?)));
+        let bounded = numbered().filter(|&(i, _)| shines(i)).filter_map(|(i, l)| Some((i, l.bounds()?)));
         let bounded = bounded.chain((first..).zip(&kept).map(|(i, t)| (i, t.bounds())));
-        let power = |l: &Emitter| l.power(&bounds);
-        let powers: Vec<DVec3> = lights.iter().map(power).chain(kept.iter().map(Triangle::power)).collect();
+        let power = |(i, l): (u32, &Emitter)| if shines(i) { l.power(&bounds) } else { DVec3::ZERO };
+        let powers: Vec<DVec3> = numbered().map(power).chain(kept.iter().map(Triangle::power)).collect();
+        let shining = far.iter().filter(|i| shines(i.id.0)).copied().collect();
         let table = TriangleTable::new(&places, first);
         Ok(Self {
             power_before: shares_before(&powers),
             by_power: AliasTable::new(powers.iter().map(|&p| luminance64(p))),
             total_power: powers.iter().sum::<DVec3>().as_vec3(),
-            infinite: infinite.iter().map(|i| i.id).collect(),
-            selector: Selector::new(bounded, infinite, lights.len() + kept.len()),
+            infinite: far.iter().map(|i| i.id).collect(),
+            selector: Selector::new(bounded, shining, lights.len() + kept.len()),
             lights,
-            camera_visible,
+            seen_by,
             triangles: kept,
             table,
             hittable,
@@ -143,9 +145,9 @@ impl Emitters {
         power.as_vec3()
     }
 
-    /// Whether camera rays see an emitter; triangles leave that to their instance.
-    pub fn camera_visible(&self, id: EmitterId) -> bool {
-        self.camera_visible.get(id.0 as usize).copied().unwrap_or(true)
+    /// Whether a ray sees an emitter; triangles leave that to their instance.
+    pub fn is_seen(&self, id: EmitterId, from_camera: bool) -> bool {
+        self.seen_by.get(id.0 as usize).is_none_or(|seen_by| seen_by.includes(from_camera))
     }
 
     /// The emitter of a mesh's triangle.

@@ -262,6 +262,30 @@ def case_white_metals_reflect_all_light() -> None:
         assert abs(ball_mean - 1.0) < 0.01
 
 
+def case_the_camera_may_see_another_world() -> None:
+    """A mirror and glass show what lights the scene, holes the backdrop."""
+    for kind, inputs in (
+        ("BsdfAnisotropic", {"Roughness": 0.0}),
+        ("BsdfGlass", {"Roughness": 0.0}),
+        ("BsdfPrincipled", {"Alpha": 0.5}),
+    ):
+        _stage(kind, inputs)
+        tree = bpy.context.scene.world.node_tree
+        other, mix = (tree.nodes.new(f"ShaderNode{n}") for n in ("Background", "MixShader"))
+        path = tree.nodes.new("ShaderNodeLightPath")
+        other.inputs["Color"].default_value = (0.9, 0.2, 0.1, 1)
+        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputWorld")
+        first = output.inputs[0].links[0].from_socket
+        tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+        tree.links.new(first, mix.inputs[1])
+        tree.links.new(other.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], output.inputs[0])
+        for integrator in ("path", "segment"):
+            found = agreement.compare(*agreement.render_both(64, 48, 256, 256, integrator))
+            print(kind, integrator)
+            _check(found, mean=0.007, blocks=0.02, correlation=0.9995)
+
+
 def case_microfacets_that_scatter_once_lose_as_much_light() -> None:
     for kind, inputs in (
         ("BsdfAnisotropic", {"Color": (0.9, 0.8, 0.7, 1), "Roughness": 0.9}),

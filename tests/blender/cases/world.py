@@ -130,7 +130,7 @@ def case_unsupported_worlds_are_named() -> None:
 
 
 def case_camera_rays_may_see_another_background() -> None:
-    """A mix by the Light Path node cannot be told apart; the camera's side is used and named."""
+    """A mix by the Light Path node becomes two domes: one that shines, and a backdrop."""
     _, tree, background = builders.world()
     other, mix = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeMixShader")
     path = tree.nodes.new("ShaderNodeLightPath")
@@ -141,9 +141,16 @@ def case_camera_rays_may_see_another_background() -> None:
     tree.links.new(background.outputs[0], mix.inputs[1])
     tree.links.new(other.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs[0])
-    dome, _, warnings = _dome()
-    assert dome["radiance"] == [0.0, 0.0, 1.0]
-    assert any("Light Path" in text for text in warnings), warnings
+    _, scene, warnings = _dome()
+    shining, backdrop = (data for _, data in scene.lights)
+    assert (shining["radiance"], shining["camera_visible"]) == ([1.0, 0.0, 0.0], False)
+    assert (backdrop["radiance"], backdrop["camera_only"]) == ([0.0, 0.0, 1.0], True)
+    assert not warnings
+    background.inputs["Strength"].default_value = 0.0
+    assert [data["camera_only"] for _, data in _dome()[1].lights] == [True]
+    tree.links.remove(mix.inputs[0].links[0])
+    tree.links.new(path.outputs["Is Glossy Ray"], mix.inputs[0])
+    assert any("Light Path" in text for text in _dome()[2])
 
 
 def case_up_is_up() -> None:
