@@ -33,6 +33,8 @@ class Exporter:
         self._translator = Translator(self.scene, log)
         # Mesh pointer -> id; None for a mesh without faces.
         self._meshes: dict[int, int | None] = {}
+        # Mesh pointer -> names of the projections that its materials look up.
+        self._asked: dict[int, set[str]] = {}
 
     def run(self) -> bool:
         """Export everything; false when the user wants to stop."""
@@ -45,6 +47,9 @@ class Exporter:
             [self._translator.material(material) for material in group.traits.materials]
             for group in found.groups
         ]
+        for group, materials in zip(found.groups, slots, strict=True):
+            asked = self._asked.setdefault(group.mesh.as_pointer(), set())
+            asked.update(*(self._translator.projections[material] for material in materials))
         for group, materials in zip(found.groups, slots, strict=True):
             if self._stop():
                 return False
@@ -67,6 +72,10 @@ class Exporter:
                     arrays,
                     readings=textures.readings,
                     uvs=textures.uvs,
+                    projections={
+                        name: textures.projections[name] for name in sorted(self._asked[pointer])
+                    },
+                    log=self._log,
                 )
         mesh = self._meshes[pointer]
         if mesh is None:

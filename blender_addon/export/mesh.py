@@ -10,6 +10,8 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..log import ExportLog
+
 # Attribute types that a shader can read: property of an element, and its number of floats.
 _ATTRIBUTE_TYPES = {
     "FLOAT": ("value", 1),
@@ -64,6 +66,14 @@ class MeshArrays:
         self.corners = _triangle_corners(mesh)
         self.indices = corner_points.astype(np.uint32)[self.corners]
         self.polygons = _get(mesh.loop_triangle_polygons, "value", self.triangle_count, np.int32)
+
+    def generated(self) -> np.ndarray:
+        """Where the points are in the mesh's texture space, before modifiers."""
+        mesh = self.mesh
+        points = _get(mesh.vertices, "undeformed_co", 3 * len(mesh.vertices), np.float32)
+        centre, size = np.array(mesh.texspace_location), np.array(mesh.texspace_size)
+        half = np.divide(0.5, size, out=np.zeros(3), where=size != 0.0)
+        return (points.reshape(-1, 3) - centre) * half + 0.5
 
     def slots(self) -> np.ndarray | None:
         """Material slot of each triangle; None where all are 0."""
@@ -155,6 +165,31 @@ class Reading:
         return result
 
 
+@dataclass(frozen=True)
+class Projection:
+    """A UV map made of where points are.
+
+    `space`: "object", or "generated": within the mesh's texture space, before modifiers.
+    `affine`: three rows of four, times these coordinates. With `in_layers` the first coordinate
+    grows by 0.5 in every other layer of the third, which are 0.5 high.
+    """
+
+    space: str
+    affine: tuple[float, ...]
+    in_layers: bool
+
+    def apply(self, arrays: MeshArrays) -> tuple[np.ndarray, bool]:
+        """Two coordinates of every point; whether one layer holds them all, where they matter."""
+        points = arrays.points if self.space == "object" else arrays.generated()
+        matrix = np.array(self.affine).reshape(3, 4)
+        values = points @ matrix[:, :3].T + matrix[:, 3]
+        if not self.in_layers:
+            return values[:, :2], True
+        layers = np.floor(2.0 * values[:, 2])
+        values[:, 0] += 0.5 * (np.median(layers) % 2)
+        return values[:, :2], bool(layers.min() == layers.max())
+
+
 def add_mesh(
     segue: Any,
     scene: Any,
@@ -162,6 +197,8 @@ def add_mesh(
     *,
     readings: Mapping[str, Reading],
     uvs: Collection[str],
+    projections: Mapping[str, Projection],
+    log: ExportLog,
 ) -> int:
     """Add a mesh with its UV maps, other attributes that are read as `uvs`, and the `readings`.
 
@@ -179,6 +216,14 @@ def add_mesh(
         if found is not None:
             values, domain, indices = found
             attributes.append(segue.Attribute(name, values[:, :2], domain, indices=indices))
+    for name, projection in projections.items():
+        values, is_level = projection.apply(arrays)
+        attributes.append(segue.Attribute(name, values.astype(np.float32), "vertex"))
+        if not is_level:
+            log.warn(
+                f"Mesh '{arrays.mesh.name}': a checker in space is not supported, it does not "
+                "change along its third axis"
+            )
     for name, reading in readings.items():
         found = arrays.attribute(reading.name)
         if found is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -18,11 +18,22 @@ Evaluate = Callable[[bpy.types.NodeSocket, Stack], Value]
 
 @dataclass(frozen=True)
 class Coordinates:
-    """`matrix` (4x4) times a UV map, or times the direction of a ray that leaves the scene."""
+    """`matrix` (4x4) times a UV map, times where a point of the mesh is, or times a direction.
+
+    `space`: "uv"; "generated" or "object" (see `export.mesh.Projection`); "environment".
+    """
 
     space: str
     uv: str
     matrix: np.ndarray
+
+    def scaled(self, factor: float) -> Coordinates:
+        """The same times a number."""
+        return replace(self, matrix=np.diag([factor, factor, factor, 1.0]) @ self.matrix)
+
+    def shifted(self, offset: float) -> Coordinates:
+        """The same plus a number."""
+        return replace(self, matrix=_shift(np.full(3, offset)) @ self.matrix)
 
     def uv_transform(self) -> tuple[float, ...]:
         """The six numbers of the ABI's texture transform; UV maps have a third component of 0."""
@@ -114,18 +125,23 @@ def equirectangular(direction: np.ndarray) -> tuple[float, float]:
 
 
 def coordinates(
-    entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate, *, world: bool
+    entry: bpy.types.NodeSocket,
+    stack: Stack,
+    evaluate: Evaluate,
+    *,
+    world: bool,
+    default: str = "uv",
 ) -> Coordinates:
-    """The coordinates that arrive at a texture's Vector input."""
+    """The coordinates that arrive at a texture's Vector input; `default`: where nothing does."""
     matrix = np.eye(4)
     own = entry
     while True:
         source = resolve(entry, stack)
         node = source.node
         if node is None:
-            space = "environment" if world else "uv"
-            # Where nothing at all arrives at a texture it takes the default UV map, and in a world
-            # the direction; other nodes and groups take the constant of their own input.
+            space = "environment" if world else default
+            # Where nothing at all arrives at a texture it takes its default coordinates, and in a
+            # world the direction; other nodes and groups take the constant of their own input.
             if entry == own and not _has_constant(source, own):
                 return Coordinates(space, "", matrix)
             constant = np.array(evaluate(entry, stack).rgb)
@@ -162,7 +178,7 @@ def _everywhere(point: np.ndarray) -> np.ndarray:
 
 
 def _origin(source: Source, world: bool) -> tuple[str, str]:
-    """What a node provides at the start of a chain: a UV map by name, or the direction."""
+    """What a node provides at the start of a chain: a space, and the name of a UV map."""
     node, name = source.node, source.output.identifier
     kind = node.bl_idname
     if world:
@@ -172,8 +188,11 @@ def _origin(source: Source, world: bool) -> tuple[str, str]:
             return "environment", ""
     elif kind == "ShaderNodeUVMap" and not node.from_instancer:
         return "uv", node.uv_map
-    elif kind == "ShaderNodeTexCoord" and name == "UV" and not node.from_instancer:
-        return "uv", ""
+    elif kind == "ShaderNodeTexCoord" and not node.from_instancer:
+        if name == "UV":
+            return "uv", ""
+        if name == "Generated" or (name == "Object" and node.object is None):
+            return name.lower(), ""
     elif kind == "ShaderNodeAttribute" and name == "Vector" and node.attribute_type == "GEOMETRY":
         return "uv", node.attribute_name
     raise UnsupportedError(f"coordinates from the output '{source.output.name}' of '{node.name}'")

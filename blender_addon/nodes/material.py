@@ -29,6 +29,8 @@ class Translator:
         self._scene = scene
         self._log = log
         self._materials: dict[int, int] = {}
+        #: Names of the projections that each material looks up, by its id.
+        self.projections: dict[int, frozenset[str]] = {}
         self.textures = TextureStore(scene, log)
 
     def material(self, material: bpy.types.Material | None) -> int:
@@ -36,7 +38,9 @@ class Translator:
         key = material.as_pointer() if material else 0
         if key not in self._materials:
             name = material.name if material else "Default"
+            self.textures.asked.clear()
             self._materials[key] = self._scene.add_material(name, self._material_json(material))
+            self.projections[self._materials[key]] = frozenset(self.textures.asked)
         return self._materials[key]
 
     def _material_json(self, material: bpy.types.Material | None) -> dict[str, Any]:

@@ -10,9 +10,18 @@ import bpy
 import numpy as np
 
 from ..export.images import Pixels, read_image
-from ..export.mesh import Reading
+from ..export.mesh import Projection, Reading
 from ..log import ExportLog
-from .values import AttributeValue, Constant, ImageSource, ImageValue, Kind, Value
+from .coordinates import Coordinates
+from .values import (
+    AttributeValue,
+    Constant,
+    ImageSource,
+    ImageValue,
+    Kind,
+    UnsupportedError,
+    Value,
+)
 
 
 class BlenderSource:
@@ -56,6 +65,10 @@ class TextureStore:
         # that the scene knows it by.
         self.uvs: set[str] = set()
         self.readings: dict[str, Reading] = {}
+        # UV maps that are made of where the points of meshes are.
+        self.projections: dict[str, Projection] = {}
+        # Those that were asked for since this was last cleared.
+        self.asked: set[str] = set()
 
     def source(self, image: bpy.types.Image, straight_alpha: bool) -> BlenderSource:
         """The source for an image, one for each treatment of its alpha."""
@@ -63,6 +76,28 @@ class TextureStore:
         if key not in self._sources:
             self._sources[key] = BlenderSource(image, straight_alpha, self._log)
         return self._sources[key]
+
+    def place(
+        self, place: Coordinates, *, in_layers: bool = False
+    ) -> tuple[str, tuple[float, ...]]:
+        """The UV map and the transform by which a flat picture is looked up.
+
+        With `in_layers` the picture is moved by half of it in every other layer of height 0.5.
+        """
+        if place.space == "uv":
+            depth = place.matrix[2]
+            if in_layers and depth[:2].any():
+                raise UnsupportedError("a pattern that is tilted against its UV map")
+            shift = 0.5 * (np.floor(2.0 * depth[3]) % 2) if in_layers else 0.0
+            transform = place.uv_transform()
+            return place.uv, (*transform[:2], transform[2] + shift, *transform[3:])
+        rows = tuple(float(value) for value in place.matrix[:3].ravel())
+        projection = Projection(place.space, rows, in_layers)
+        known = next((n for n, other in self.projections.items() if other == projection), None)
+        name = known or f"{place.space} ({len(self.projections) + 1})"
+        self.projections[name] = projection
+        self.asked.add(name)
+        return name, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
     def image(self, source: ImageSource) -> int:
         """Id of a source's image in the scene."""

@@ -262,6 +262,37 @@ def case_white_metals_reflect_all_light() -> None:
         assert abs(ball_mean - 1.0) < 0.01
 
 
+def case_checkers_and_pictures_by_other_coordinates() -> None:
+    """On the floor, and pictures by the object's own coordinates on the ball as well."""
+    pixels = np.ones((6, 6, 4), np.float32)
+    pixels[..., :3] = np.random.default_rng(2).random((6, 6, 3))
+    for space, kind in (
+        *((space, "TexChecker") for space in ("", "UV", "Object", "Generated")),
+        *((space, "TexImage") for space in ("Object", "Generated")),
+    ):
+        _stage("BsdfDiffuse", {})
+        material = bpy.data.materials["Floor"]
+        tree = material.node_tree
+        diffuse = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
+        texture = tree.nodes.new(f"ShaderNode{kind}")
+        if kind == "TexImage":
+            texture.image, texture.interpolation = builders.image("Patches", pixels), "Closest"
+            bpy.data.objects["Ball"].data.materials[0] = material
+        else:
+            texture.inputs["Scale"].default_value = 0.7 if space == "Object" else 3.0
+            texture.inputs["Color1"].default_value = (0.8, 0.1, 0.1, 1)
+        tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
+        if space:
+            place, mapping = (tree.nodes.new(f"ShaderNode{n}") for n in ("TexCoord", "Mapping"))
+            mapping.inputs["Rotation"].default_value = (0, 0, 0.3)
+            mapping.inputs["Location"].default_value = (0.1, 0.2, 0.0)
+            tree.links.new(place.outputs[space], mapping.inputs["Vector"])
+            tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+        found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
+        print(space, kind)
+        _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
+
+
 def case_the_camera_may_see_another_world() -> None:
     """A mirror and glass show what lights the scene, holes the backdrop."""
     for kind, inputs in (

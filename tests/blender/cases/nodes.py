@@ -149,6 +149,35 @@ def case_single_scattering_is_told_from_multiple() -> None:
             assert (surface.get("multiscatter") is False) == loses and not warnings
 
 
+def case_checkers_in_space_are_named() -> None:
+    tree = Tree()
+    shader = tree.surface(tree.node("BsdfDiffuse"))
+    checker = tree.node("TexChecker", Scale=2.0)
+    tree.link(checker.outputs["Color"], shader.inputs["Color"])
+    for data, named in ((builders.quad("Level", 1.0), False), (builders.cube("Cube"), True)):
+        data.materials.append(tree.material)
+        placed = builders.link(data)
+        _, warnings = builders.export()
+        bpy.data.objects.remove(placed)
+        assert any(f"'{data.name}': a checker in space" in text for text in warnings) == named
+
+
+def case_projections_go_to_the_meshes_that_ask_for_them() -> None:
+    tree = Tree()
+    shader = tree.surface(tree.node("BsdfDiffuse"))
+    checker, place = tree.node("TexChecker"), tree.node("TexCoord")
+    tree.link(place.outputs["Object"], checker.inputs["Vector"])
+    tree.link(checker.outputs["Fac"], shader.inputs["Roughness"])
+    for name, material in (("Asks", tree.material), ("Plain", None)):
+        data = builders.quad(name, 1.0)
+        data.materials.append(material)
+        builders.link(data)
+    scene, _ = builders.export()
+    names = {mesh["name"]: [a.name for a in mesh["attributes"]] for mesh in scene.meshes}
+    assert any("object" in name for name in names["Asks"]), names
+    assert not any("object" in name for name in names["Plain"]), names
+
+
 def case_opaque_shadows_are_named() -> None:
     tree = Tree()
     tree.material.use_transparent_shadow = False
