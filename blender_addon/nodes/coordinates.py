@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -34,6 +34,11 @@ class Coordinates:
     def shifted(self, offset: float) -> Coordinates:
         """The same plus a number."""
         return replace(self, matrix=_shift(np.full(3, offset)) @ self.matrix)
+
+    def along(self, row: Sequence[float]) -> Coordinates:
+        """`row` (4) times these, as the first coordinate; the others are constant."""
+        rest = [[0.0, 0.0, 0.0, height] for height in (0.5, 0.0, 1.0)]
+        return replace(self, matrix=np.array([row, *rest]) @ self.matrix)
 
     def uv_transform(self) -> tuple[float, ...]:
         """The six numbers of the ABI's texture transform; UV maps have a third component of 0."""

@@ -11,11 +11,11 @@ import numpy as np
 from . import operators
 from .coordinates import coordinates, equirectangular
 from .curves import float_curve, rgb_curves
+from .patterns import checker, gradient, wave
 from .tree import Stack, is_linked
 from .values import (
     KINDS,
     AttributeValue,
-    Baked,
     Constant,
     ImageValue,
     Kind,
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 _WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "black", "MIRROR": "mirror"}
 
 _RAMP_SIZE = 1024
-
-# Row 0 is on top.
-_SQUARES = Baked("Checker", np.array([[[1.0], [0.0]], [[0.0], [1.0]]], np.float32))
 
 
 Handler = Callable[["Evaluator", bpy.types.Node, bpy.types.NodeSocket, Stack], Value]
@@ -86,24 +83,6 @@ def _image(
     else:
         sampling = Sampling("uv", transform, uv, _WRAP[node.extension], texture_filter)
     return ImageValue(source, sampling, "float" if alpha else "color", "a" if alpha else "rgb")
-
-
-def _checker(
-    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
-) -> Value:
-    """Checker Texture, as a picture of four texels for what is level in its third coordinate."""
-    place = coordinates(node.inputs["Vector"], stack, ev.value, world=ev.world, default="generated")
-    if place.space == "environment":
-        raise UnsupportedError("a texture of this kind in this place")
-    # Cycles' own way to keep whole numbers from flickering, and two squares to a picture.
-    steps = place.scaled(ev.number(node.inputs["Scale"], stack)).shifted(1e-6).scaled(0.999999)
-    uv, transform = ev.textures.place(steps.scaled(0.5), in_layers=True)
-    sampling = Sampling("uv", transform, uv, "repeat", "closest")
-    squares = ImageValue(_SQUARES, sampling, "float", "r")
-    if output.identifier == "Fac":
-        return squares
-    colors = ev.inputs(node, stack, "Color1", "Color2")
-    return ev.combine(node, "color", lambda t, a, b: b + (a - b) * t, squares, *colors)
 
 
 def _attribute(
@@ -302,7 +281,9 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _image,
     "ShaderNodeVertexColor": _attribute,
-    "ShaderNodeTexChecker": _checker,
+    "ShaderNodeTexChecker": checker,
+    "ShaderNodeTexGradient": gradient,
+    "ShaderNodeTexWave": wave,
     "ShaderNodeAttribute": _attribute,
     "ShaderNodeMath": _math,
     "ShaderNodeVectorMath": _vector_math,

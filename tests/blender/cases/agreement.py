@@ -262,6 +262,21 @@ def case_white_metals_reflect_all_light() -> None:
         assert abs(ball_mean - 1.0) < 0.01
 
 
+def _floor_of(kind: str, space: str) -> tuple[bpy.types.NodeTree, bpy.types.Node, bpy.types.Node]:
+    """The stage with a texture for the floor, by turned coordinates: tree, texture and shader."""
+    _stage("BsdfDiffuse", {})
+    tree = bpy.data.materials["Floor"].node_tree
+    texture = tree.nodes.new(f"ShaderNode{kind}")
+    if space:
+        place, mapping = (tree.nodes.new(f"ShaderNode{n}") for n in ("TexCoord", "Mapping"))
+        mapping.inputs["Rotation"].default_value = (0, 0, 0.3)
+        mapping.inputs["Location"].default_value = (0.1, 0.2, 0.0)
+        tree.links.new(place.outputs[space], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    diffuse = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
+    return tree, texture, diffuse
+
+
 def case_checkers_and_pictures_by_other_coordinates() -> None:
     """On the floor, and pictures by the object's own coordinates on the ball as well."""
     pixels = np.ones((6, 6, 4), np.float32)
@@ -270,26 +285,44 @@ def case_checkers_and_pictures_by_other_coordinates() -> None:
         *((space, "TexChecker") for space in ("", "UV", "Object", "Generated")),
         *((space, "TexImage") for space in ("Object", "Generated")),
     ):
-        _stage("BsdfDiffuse", {})
-        material = bpy.data.materials["Floor"]
-        tree = material.node_tree
-        diffuse = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
-        texture = tree.nodes.new(f"ShaderNode{kind}")
+        tree, texture, diffuse = _floor_of(kind, space)
         if kind == "TexImage":
             texture.image, texture.interpolation = builders.image("Patches", pixels), "Closest"
-            bpy.data.objects["Ball"].data.materials[0] = material
+            bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
         else:
             texture.inputs["Scale"].default_value = 0.7 if space == "Object" else 3.0
             texture.inputs["Color1"].default_value = (0.8, 0.1, 0.1, 1)
         tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
-        if space:
-            place, mapping = (tree.nodes.new(f"ShaderNode{n}") for n in ("TexCoord", "Mapping"))
-            mapping.inputs["Rotation"].default_value = (0, 0, 0.3)
-            mapping.inputs["Location"].default_value = (0.1, 0.2, 0.0)
-            tree.links.new(place.outputs[space], mapping.inputs["Vector"])
-            tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
         found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
         print(space, kind)
+        _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
+
+
+def case_gradients_and_waves() -> None:
+    """Through a colour ramp, on floor and ball."""
+    for kind, properties, scale, space in (
+        ("TexGradient", {"gradient_type": "LINEAR"}, 0.0, "Generated"),
+        ("TexGradient", {"gradient_type": "QUADRATIC"}, 0.0, "UV"),
+        ("TexGradient", {"gradient_type": "EASING"}, 0.0, ""),
+        ("TexGradient", {"gradient_type": "DIAGONAL"}, 0.0, "Object"),
+        ("TexWave", {"bands_direction": "X"}, 0.5, "Object"),
+        ("TexWave", {"bands_direction": "DIAGONAL", "wave_profile": "SAW"}, 1.0, "Generated"),
+        ("TexWave", {"bands_direction": "Y", "wave_profile": "TRI"}, 1.0, "UV"),
+    ):
+        tree, texture, diffuse = _floor_of(kind, space)
+        for key, value in properties.items():
+            setattr(texture, key, value)
+        if scale:
+            texture.inputs["Scale"].default_value = scale
+            texture.inputs["Phase Offset"].default_value = 0.7
+        ramp = tree.nodes.new("ShaderNodeValToRGB")
+        ramp.color_ramp.elements[0].color = (0.8, 0.1, 0.1, 1)
+        ramp.color_ramp.elements[0].position = 0.3
+        tree.links.new(texture.outputs[1], ramp.inputs[0])
+        tree.links.new(ramp.outputs["Color"], diffuse.inputs["Color"])
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
+        print(kind, properties, space)
         _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
 
 

@@ -162,6 +162,23 @@ def case_checkers_in_space_are_named() -> None:
         assert any(f"'{data.name}': a checker in space" in text for text in warnings) == named
 
 
+def case_patterns_without_a_counterpart_are_named() -> None:
+    tree = Tree()
+    for kind, properties, inputs in (
+        ("TexGradient", {"gradient_type": "SPHERICAL"}, {}),
+        ("TexWave", {"wave_type": "RINGS"}, {}),
+        ("TexWave", {}, {"Distortion": 2.0}),
+        ("TexNoise", {}, {}),
+    ):
+        shader = tree.surface(tree.node("BsdfDiffuse"))
+        texture = tree.node(kind, **inputs)
+        for key, value in properties.items():
+            setattr(texture, key, value)
+        tree.link(texture.outputs["Color"], shader.inputs["Color"])
+        warnings = tree.export()[2]
+        assert any(f"'{texture.name}'" in text for text in warnings), (kind, properties, warnings)
+
+
 def case_projections_go_to_the_meshes_that_ask_for_them() -> None:
     tree = Tree()
     shader = tree.surface(tree.node("BsdfDiffuse"))

@@ -1,0 +1,106 @@
+"""Textures that repeat or end, as pictures; those of noise have no counterpart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from .coordinates import Coordinates, coordinates
+from .tree import Stack
+from .values import Baked, Constant, ImageValue, Sampling, UnsupportedError, Value, convert
+
+if TYPE_CHECKING:
+    from .evaluate import Evaluator
+
+# Row 0 is on top.
+_SQUARES = Baked("Checker", np.array([[[1.0], [0.0]], [[0.0], [1.0]]], np.float32))
+
+# Texels of a picture of one row.
+_SIZE = 1024
+
+# What gradients make of their coordinate from 0 to 1, and what that is of x, y, z and 1.
+_GRADIENTS = {
+    "LINEAR": (lambda x: x, (1.0, 0.0, 0.0, 0.0)),
+    "QUADRATIC": (lambda x: x * x, (1.0, 0.0, 0.0, 0.0)),
+    "EASING": (lambda x: x * x * (3.0 - 2.0 * x), (1.0, 0.0, 0.0, 0.0)),
+    "DIAGONAL": (lambda x: x, (0.5, 0.5, 0.0, 0.0)),
+}
+
+# What waves make of their phase in turns, from 0 to 1.
+_PROFILES = {
+    "SIN": lambda t: 0.5 - 0.5 * np.cos(2.0 * np.pi * t),
+    "SAW": lambda t: t,
+    "TRI": lambda t: 1.0 - np.abs(2.0 * t - 1.0),
+}
+
+# Phase of bands, radians, by x, y and z.
+_BANDS = {
+    "X": (20.0, 0.0, 0.0),
+    "Y": (0.0, 20.0, 0.0),
+    "Z": (0.0, 0.0, 20.0),
+    "DIAGONAL": (10.0, 10.0, 10.0),
+}
+
+
+def _place(ev: Evaluator, node: bpy.types.Node, stack: Stack) -> Coordinates:
+    place = coordinates(node.inputs["Vector"], stack, ev.value, world=ev.world, default="generated")
+    if place.space == "environment":
+        raise UnsupportedError("a texture of this kind in this place")
+    return place
+
+
+def _steady(place: Coordinates, scale: float) -> Coordinates:
+    """Scaled, and moved as Cycles does it to keep whole numbers from flickering."""
+    return place.scaled(scale).shifted(1e-6).scaled(0.999999)
+
+
+def _row(ev: Evaluator, place: Coordinates, values: np.ndarray, wrap: str) -> ImageValue:
+    """A picture of one row, looked up by the first coordinate."""
+    uv, transform = ev.textures.place(place)
+    picture = Baked("Pattern", values.astype(np.float32)[None, :, None])
+    return ImageValue(picture, Sampling("uv", transform, uv, wrap), "float", "r")
+
+
+def _shown(value: ImageValue, output: bpy.types.NodeSocket) -> Value:
+    return convert(value, "color") if output.identifier == "Color" else value
+
+
+def checker(
+    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+) -> Value:
+    """Checker Texture, as a picture of four texels for what is level in its third coordinate."""
+    steps = _steady(_place(ev, node, stack), ev.number(node.inputs["Scale"], stack))
+    uv, transform = ev.textures.place(steps.scaled(0.5), in_layers=True)
+    squares = ImageValue(_SQUARES, Sampling("uv", transform, uv, "repeat", "closest"), "float", "r")
+    if output.identifier != "Color":
+        return squares
+    colors = ev.inputs(node, stack, "Color1", "Color2")
+    return ev.combine(node, "color", lambda t, a, b: b + (a - b) * t, squares, *colors)
+
+
+def gradient(
+    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+) -> Value:
+    """Gradient Texture, but for the radial kinds."""
+    if node.gradient_type not in _GRADIENTS:
+        raise UnsupportedError(f"the {node.gradient_type.lower().replace('_', ' ')} gradient")
+    curve, row = _GRADIENTS[node.gradient_type]
+    # From the middle of the first texel to that of the last.
+    place = _place(ev, node, stack).along(np.array(row) * (_SIZE - 1) / _SIZE)
+    place = place.along((1.0, 0.0, 0.0, 0.5 / _SIZE))
+    return _shown(_row(ev, place, curve(np.linspace(0.0, 1.0, _SIZE)), "clamp"), output)
+
+
+def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
+    """Wave Texture of bands without distortion."""
+    if node.wave_type != "BANDS":
+        raise UnsupportedError("waves in rings")
+    if ev.value(node.inputs["Distortion"], stack) != Constant.number(0.0):
+        ev.warn(node, "distortion", "even waves are used")
+    steps = _steady(_place(ev, node, stack), ev.number(node.inputs["Scale"], stack))
+    phase = ev.number(node.inputs["Phase Offset"], stack)
+    turns = np.array([*_BANDS[node.bands_direction], phase]) / (2.0 * np.pi)
+    values = _PROFILES[node.wave_profile]((np.arange(_SIZE) + 0.5) / _SIZE)
+    return _shown(_row(ev, steps.along(turns), values, "repeat"), output)
