@@ -166,6 +166,32 @@ class Reading:
 
 
 @dataclass(frozen=True)
+class Solid:
+    """A colour attribute made of where points are: a place in space, for noise.
+
+    `space`: as of a `Projection`, or "uv", by the map of the name `uv`. `affine`: likewise.
+    """
+
+    space: str
+    uv: str
+    affine: tuple[float, ...]
+
+    def apply(self, arrays: MeshArrays) -> tuple[np.ndarray, str, np.ndarray | None]:
+        """Three coordinates, the elements that have them, and their indices."""
+        matrix = np.array(self.affine).reshape(3, 4)
+        indices = None
+        if self.space == "uv":
+            maps = arrays.uv_maps()
+            found = [values for name, values in maps if name == self.uv or not self.uv]
+            flat = found[0] if found else np.zeros((len(arrays.mesh.loops), 2), np.float32)
+            points, indices = np.pad(flat, ((0, 0), (0, 1))), arrays.corners
+        else:
+            points = arrays.points if self.space == "object" else arrays.generated()
+        values = (points @ matrix[:, :3].T + matrix[:, 3]).astype(np.float32)
+        return values, "vertex" if indices is None else "corner", indices
+
+
+@dataclass(frozen=True)
 class Projection:
     """A UV map made of where points are.
 
@@ -197,7 +223,7 @@ def add_mesh(
     *,
     readings: Mapping[str, Reading],
     uvs: Collection[str],
-    projections: Mapping[str, Projection],
+    projections: Mapping[str, Projection | Solid],
     log: ExportLog,
 ) -> int:
     """Add a mesh with its UV maps, other attributes that are read as `uvs`, and the `readings`.
@@ -217,6 +243,10 @@ def add_mesh(
             values, domain, indices = found
             attributes.append(segue.Attribute(name, values[:, :2], domain, indices=indices))
     for name, projection in projections.items():
+        if isinstance(projection, Solid):
+            values, domain, indices = projection.apply(arrays)
+            attributes.append(segue.Attribute(name, values, domain, indices=indices))
+            continue
         values, is_level = projection.apply(arrays)
         attributes.append(segue.Attribute(name, values.astype(np.float32), "vertex"))
         if not is_level:

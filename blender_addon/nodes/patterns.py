@@ -1,4 +1,4 @@
-"""Textures that repeat or end, as pictures; those of noise have no counterpart."""
+"""Procedural textures: what repeats or ends is a picture, and noise looks one up."""
 
 from __future__ import annotations
 
@@ -104,3 +104,25 @@ def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stac
     turns = np.array([*_BANDS[node.bands_direction], phase]) / (2.0 * np.pi)
     values = _PROFILES[node.wave_profile]((np.arange(_SIZE) + 0.5) / _SIZE)
     return _shown(_row(ev, steps.along(turns), values, "repeat"), output)
+
+
+def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
+    """Noise Texture in three dimensions; its colour is its factor in all channels."""
+    if node.noise_dimensions != "3D":
+        raise UnsupportedError(f"noise in {node.noise_dimensions}")
+    if getattr(node, "noise_type", "FBM") != "FBM":
+        raise UnsupportedError(f"{node.noise_type.lower().replace('_', ' ')} noise")
+    if not getattr(node, "normalize", True):
+        raise UnsupportedError("noise that is not normalized")
+    if output.identifier == "Color":
+        ev.warn(node, "coloured noise", "grey noise is used")
+    place = _place(ev, node, stack).scaled(ev.number(node.inputs["Scale"], stack))
+    numbers = [
+        ev.number(node.inputs[name], stack) if name in node.inputs else default
+        for name, default in (
+            *(("Detail", 2.0), ("Roughness", 0.5), ("Lacunarity", 2.0), ("Distortion", 0.0)),
+        )
+    ]
+    sampling = Sampling("noise", tuple(numbers), ev.textures.solid(place), "clamp")
+    ramp = Baked("Noise", np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[None, :, None])
+    return _shown(ImageValue(ramp, sampling, "float", "r"), output)

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..export.images import Pixels, read_image
-from ..export.mesh import Projection, Reading
+from ..export.mesh import Projection, Reading, Solid
 from ..log import ExportLog
 from .coordinates import Coordinates
 from .values import (
@@ -22,6 +22,9 @@ from .values import (
     UnsupportedError,
     Value,
 )
+
+#: What the numbers of a picture that is looked up by noise are.
+NOISE = ("detail", "roughness", "lacunarity", "distortion")
 
 
 class BlenderSource:
@@ -66,7 +69,7 @@ class TextureStore:
         self.uvs: set[str] = set()
         self.readings: dict[str, Reading] = {}
         # UV maps that are made of where the points of meshes are.
-        self.projections: dict[str, Projection] = {}
+        self.projections: dict[str, Projection | Solid] = {}
         # Those that were asked for since this was last cleared.
         self.asked: set[str] = set()
 
@@ -92,12 +95,20 @@ class TextureStore:
             transform = place.uv_transform()
             return place.uv, (*transform[:2], transform[2] + shift, *transform[3:])
         rows = tuple(float(value) for value in place.matrix[:3].ravel())
-        projection = Projection(place.space, rows, in_layers)
+        name = self._projected(Projection(place.space, rows, in_layers))
+        return name, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+    def solid(self, place: Coordinates) -> str:
+        """The attribute that holds three coordinates."""
+        rows = tuple(float(value) for value in place.matrix[:3].ravel())
+        return self._projected(Solid(place.space, place.uv, rows))
+
+    def _projected(self, projection: Projection | Solid) -> str:
         known = next((n for n, other in self.projections.items() if other == projection), None)
-        name = known or f"{place.space} ({len(self.projections) + 1})"
+        name = known or f"{projection.space} ({len(self.projections) + 1})"
         self.projections[name] = projection
         self.asked.add(name)
-        return name, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        return name
 
     def image(self, source: ImageSource) -> int:
         """Id of a source's image in the scene."""
@@ -129,18 +140,22 @@ class TextureStore:
         else:
             sampling = value.sampling
             scale = [factor * value.gain for factor in scale]
-            if sampling.uv:
-                self.uvs.add(sampling.uv)
             name = value.source.name
-            data = {
-                "type": "image",
-                "image": self.image(value.source),
-                "uv": sampling.uv,
-                "transform": list(sampling.matrix),
-                "wrap_s": sampling.wrap,
-                "wrap_t": sampling.wrap,
-                "filter": sampling.filter,
-            }
+            data = {"image": self.image(value.source)}
+            if sampling.space == "noise":
+                numbers = zip(NOISE, sampling.matrix, strict=True)
+                data |= {"type": "noise", "place": sampling.uv, **dict(numbers)}
+            else:
+                if sampling.uv:
+                    self.uvs.add(sampling.uv)
+                data |= {
+                    "type": "image",
+                    "uv": sampling.uv,
+                    "transform": list(sampling.matrix),
+                    "wrap_s": sampling.wrap,
+                    "wrap_t": sampling.wrap,
+                    "filter": sampling.filter,
+                }
             data["scale"] = [*scale, 1.0]
             data["bias"] = [*bias, 0.0]
         key = json.dumps(data, sort_keys=True)

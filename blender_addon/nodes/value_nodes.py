@@ -11,7 +11,7 @@ import numpy as np
 from . import operators
 from .coordinates import coordinates, equirectangular
 from .curves import float_curve, rgb_curves
-from .patterns import checker, gradient, wave
+from .patterns import checker, gradient, noise, wave
 from .tree import Stack, is_linked
 from .values import (
     KINDS,
@@ -283,6 +283,7 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeVertexColor": _attribute,
     "ShaderNodeTexChecker": checker,
     "ShaderNodeTexGradient": gradient,
+    "ShaderNodeTexNoise": noise,
     "ShaderNodeTexWave": wave,
     "ShaderNodeAttribute": _attribute,
     "ShaderNodeMath": _math,

@@ -84,10 +84,11 @@ class Sampling:
     """How an image is looked up.
 
     `matrix`: for "uv" the six numbers of the ABI's texture transform, for "environment" the nine of
-    a 3x3 matrix applied to the direction.
+    a 3x3 matrix applied to the direction, for "noise" what its strength depends on; then `uv` is
+    the attribute that says where.
     """
 
-    space: Literal["uv", "environment"]
+    space: Literal["uv", "environment", "noise"]
     matrix: tuple[float, ...]
     uv: str = ""
     wrap: str = "repeat"

@@ -4,6 +4,7 @@ pub mod color;
 pub mod density;
 pub mod distribution;
 pub mod frame;
+pub mod noise;
 pub mod octahedral;
 pub mod sampler;
 pub mod shared_exponent;

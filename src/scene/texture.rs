@@ -1,6 +1,7 @@
 //! Textures: where a material's values come from when they are not constant.
 
 use super::SceneError;
+use crate::math::noise::Fractal;
 use glam::{Affine2, Mat2, Vec2, Vec4};
 use serde::Deserialize;
 
@@ -49,6 +50,21 @@ pub struct ImageTexture {
     pub bias: Vec4,
 }
 
+/// Noise by a place that the mesh has as a colour attribute, and what it is shown as.
+#[derive(Clone, Debug)]
+pub struct NoiseTexture {
+    /// Name of the attribute; where a mesh has none, all is at its origin.
+    pub place: String,
+    /// The noise.
+    pub noise: Fractal,
+    /// Index of the image whose upper row has the values from 0 to 1, from left to right.
+    pub image: u32,
+    /// Factor of the image's value.
+    pub scale: Vec4,
+    /// Added after the factor.
+    pub bias: Vec4,
+}
+
 /// A texture: a function of the surface point with an RGBA value.
 #[derive(Clone, Debug)]
 pub enum Texture {
@@ -56,6 +72,8 @@ pub enum Texture {
     Constant(Vec4),
     /// A picture.
     Image(Box<ImageTexture>),
+    /// Noise.
+    Noise(Box<NoiseTexture>),
     /// A colour attribute of the mesh, or `default` where the mesh has none of that name.
     Attribute {
         /// Name of the attribute.
@@ -88,10 +106,37 @@ enum Json {
         #[serde(default)]
         bias: [f32; 4],
     },
+    Noise {
+        place: String,
+        image: u32,
+        #[serde(default)]
+        detail: f32,
+        #[serde(default = "half")]
+        roughness: f32,
+        #[serde(default = "two")]
+        lacunarity: f32,
+        #[serde(default)]
+        distortion: f32,
+        #[serde(default = "ones")]
+        scale: [f32; 4],
+        #[serde(default)]
+        bias: [f32; 4],
+    },
     Attribute {
         name: String,
         default: [f32; 4],
     },
+}
+
+/// Octaves beyond the first, at most.
+const MOST_DETAIL: f32 = 15.0;
+
+fn half() -> f32 {
+    0.5
+}
+
+fn two() -> f32 {
+    2.0
 }
 
 fn identity() -> [f32; 6] {
@@ -110,15 +155,17 @@ impl Texture {
             true => Ok(()),
             false => Err(fail(format!("{what} has a value that is not finite"))),
         };
+        let exists = |image: u32| match (image as usize) < image_count {
+            true => Ok(()),
+            false => Err(fail(format!("there is no image {image}"))),
+        };
         match serde_json::from_str(json).map_err(|e| fail(e.to_string()))? {
             Json::Constant { value } => {
                 finite("value", &value)?;
                 Ok(Self::Constant(value.into()))
             }
             Json::Image { image, uv, transform, wrap_s, wrap_t, filter, scale, bias } => {
-                if image as usize >= image_count {
-                    return Err(fail(format!("there is no image {image}")));
-                }
+                exists(image)?;
                 finite("transform", &transform)?;
                 finite("scale", &scale)?;
                 finite("bias", &bias)?;
@@ -135,6 +182,20 @@ impl Texture {
                     scale: scale.into(),
                     bias: bias.into(),
                 })))
+            }
+            Json::Noise { place, image, detail, roughness, lacunarity, distortion, scale, bias } => {
+                exists(image)?;
+                if place.is_empty() {
+                    return Err(fail("place names no attribute".into()));
+                }
+                finite("noise", &[detail, roughness, lacunarity, distortion])?;
+                finite("scale", &scale)?;
+                finite("bias", &bias)?;
+                let detail = detail.clamp(0.0, MOST_DETAIL);
+                let roughness = roughness.max(0.0);
+                let noise = Fractal { detail, roughness, lacunarity, distortion };
+                let (scale, bias) = (scale.into(), bias.into());
+                Ok(Self::Noise(Box::new(NoiseTexture { place, noise, image, scale, bias })))
             }
             Json::Attribute { name: attribute, default } => {
                 finite("default", &default)?;
@@ -157,7 +218,11 @@ mod tests {
         for (json, what) in [
             (r#"{"type":"image","image":1}"#, "no image 1"),
             (r#"{"type":"image","image":0,"wrap":"x"}"#, "wrap"),
-            (r#"{"type":"noise"}"#, "noise"),
+            (r#"{"type":"voronoi"}"#, "voronoi"),
+            (r#"{"type":"noise","image":0}"#, "place"),
+            (r#"{"type":"noise","place":"","image":0}"#, "place"),
+            (r#"{"type":"noise","place":"p","image":1}"#, "no image 1"),
+            (r#"{"type":"noise","place":"p","image":0,"detail":1e39}"#, "noise"),
             (r#"{"type":"constant","value":[1,2,3]}"#, "length"),
         ] {
             let e = Texture::from_json("t", json, 1).unwrap_err().to_string();

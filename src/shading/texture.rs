@@ -2,7 +2,7 @@
 
 use crate::math::luminance;
 use crate::scene::mesh::Attribute;
-use crate::scene::texture::{ImageTexture, Reconstruction, Texture, Wrap};
+use crate::scene::texture::{ImageTexture, NoiseTexture, Reconstruction, Texture, Wrap};
 use crate::scene::value::{Channel, Value};
 use crate::scene::{Image, Mesh, Scene};
 use glam::{Vec2, Vec3, Vec4};
@@ -31,6 +31,9 @@ pub struct TextureSet {
     color_names: Vec<Box<[u32]>>,
 }
 
+/// Share of the finest length of noise over which it is taken for straight.
+const FINE: f32 = 0.02;
+
 /// Name number that means "the first set".
 const FIRST: u32 = u32::MAX;
 
@@ -43,6 +46,7 @@ impl TextureSet {
             .filter_map(|t| match t {
                 Texture::Constant(_) => None,
                 Texture::Image(t) => Some(t.uv.as_str()),
+                Texture::Noise(t) => Some(t.place.as_str()),
                 Texture::Attribute { name, .. } => Some(name.as_str()),
             })
             .collect();
@@ -57,6 +61,7 @@ impl TextureSet {
             .map(|t| match t {
                 Texture::Constant(_) => FIRST,
                 Texture::Image(t) => number(&t.uv),
+                Texture::Noise(t) => number(&t.place),
                 Texture::Attribute { name, .. } => number(name),
             })
             .collect();
@@ -75,14 +80,25 @@ impl TextureSet {
                 let image = &self.scene.images[t.image as usize];
                 sample(image, t, t.transform.transform_point2(uv)) * t.scale + t.bias
             }
-            Texture::Attribute { default, .. } => {
-                let colors = &self.scene.meshes[at.mesh as usize].colors;
-                match index(&self.color_names[at.mesh as usize], self.texture_names[texture as usize]) {
-                    Some(i) => interpolate(&colors[i].1, &self.scene.meshes[at.mesh as usize], at),
-                    None => *default,
-                }
-            }
+            Texture::Noise(t) => self.noise(t, self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate()),
+            Texture::Attribute { default, .. } => self.attribute(texture, at).unwrap_or(*default),
         }
+    }
+
+    /// The colour attribute that a texture names.
+    fn attribute(&self, texture: u32, at: &MeshPoint) -> Option<Vec4> {
+        let mesh = &self.scene.meshes[at.mesh as usize];
+        let i = index(&self.color_names[at.mesh as usize], self.texture_names[texture as usize])?;
+        Some(interpolate(&mesh.colors[i].1, mesh, at))
+    }
+
+    fn noise(&self, t: &NoiseTexture, place: Vec3) -> Vec4 {
+        let image = &self.scene.images[t.image as usize];
+        let last = image.width() - 1;
+        let x = t.noise.at(place).clamp(0.0, 1.0) * last as f32;
+        let left = (x as u32).min(last.saturating_sub(1));
+        let (a, b) = (image.texel(left, 0), image.texel((left + 1).min(last), 0));
+        a.lerp(b, x - left as f32) * t.scale + t.bias
     }
 
     /// A parameter as a colour.
@@ -123,6 +139,22 @@ impl TextureSet {
                 let gradient = Vec2::new(across(Vec2::X), across(Vec2::Y)) * size;
                 let along = |edge: Vec2| gradient.dot(t.transform.transform_vector2(edge));
                 Vec2::new(along(b - a), along(c - a))
+            }
+            Texture::Noise(t) => {
+                let corner = |u, v| {
+                    let at = MeshPoint { barycentrics: Vec2::new(u, v), ..*at };
+                    self.attribute(texture, &at).unwrap_or(Vec4::ZERO).truncate()
+                };
+                let place = self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate();
+                let first = corner(0.0, 0.0);
+                let along = |edge: Vec3| {
+                    let length = edge.length();
+                    let step = 0.5 * FINE * t.noise.finest();
+                    let d = edge * (step / length);
+                    let rise = read(self.noise(t, place + d)) - read(self.noise(t, place - d));
+                    if length > 0.0 { rise * (length / (2.0 * step)) } else { 0.0 }
+                };
+                Vec2::new(along(corner(1.0, 0.0) - first), along(corner(0.0, 1.0) - first))
             }
             Texture::Attribute { .. } => {
                 let corner = |u, v| self.lookup(texture, &MeshPoint { barycentrics: Vec2::new(u, v), ..*at });

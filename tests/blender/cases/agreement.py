@@ -298,6 +298,36 @@ def case_checkers_and_pictures_by_other_coordinates() -> None:
         _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
 
 
+def case_noise() -> None:
+    """As colour through a ramp and as bumps, on floor and ball."""
+    for inputs, space, as_bumps in (
+        ({"Scale": 3.0, "Detail": 0.0}, "", False),
+        ({"Scale": 2.0, "Detail": 3.5, "Roughness": 0.6}, "Object", False),
+        ({"Scale": 4.0, "Distortion": 0.8, "Lacunarity": 2.3}, "UV", False),
+        ({"Scale": 3.0, "Detail": 1.0}, "Object", True),
+    ):
+        tree, texture, diffuse = _floor_of("TexNoise", space)
+        for name, value in inputs.items():
+            texture.inputs[name].default_value = value
+        if as_bumps:
+            bump = tree.nodes.new("ShaderNodeBump")
+            # Of steep bumps Cycles softens the terminator.
+            bump.inputs["Distance"].default_value = 0.06
+            tree.links.new(texture.outputs[0], bump.inputs["Height"])
+            tree.links.new(bump.outputs["Normal"], diffuse.inputs["Normal"])
+        else:
+            ramp = tree.nodes.new("ShaderNodeValToRGB")
+            ramp.color_ramp.elements[0].color = (0.8, 0.1, 0.1, 1)
+            ramp.color_ramp.elements[0].position = 0.4
+            ramp.color_ramp.elements[1].position = 0.6
+            tree.links.new(texture.outputs[0], ramp.inputs[0])
+            tree.links.new(ramp.outputs["Color"], diffuse.inputs["Color"])
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
+        print(inputs, space, as_bumps)
+        _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
+
+
 def case_gradients_and_waves() -> None:
     """Through a colour ramp, on floor and ball."""
     for kind, properties, scale, space in (

@@ -169,6 +169,8 @@ def case_patterns_without_a_counterpart_are_named() -> None:
         ("TexWave", {"wave_type": "RINGS"}, {}),
         ("TexWave", {}, {"Distortion": 2.0}),
         ("TexNoise", {}, {}),
+        ("TexNoise", {"noise_dimensions": "4D"}, {}),
+        ("TexVoronoi", {}, {}),
     ):
         shader = tree.surface(tree.node("BsdfDiffuse"))
         texture = tree.node(kind, **inputs)
