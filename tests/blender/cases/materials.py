@@ -405,11 +405,11 @@ def case_arithmetic_on_images() -> None:
 def case_unsupported_nodes_are_named_once() -> None:
     tree = Tree()
     diffuse = tree.surface(tree.node("BsdfDiffuse"))
-    noise = tree.node("TexNoise")
+    cells = tree.node("TexVoronoi")
     for name in ("Color", "Roughness"):
-        tree.link(noise.outputs["Color"], diffuse.inputs[name])
+        tree.link(cells.outputs["Color"], diffuse.inputs[name])
     surface, _, warnings = tree.export()
-    assert len(warnings) == 1 and "Noise Texture" in warnings[0], warnings
+    assert len(warnings) == 1 and "Voronoi Texture" in warnings[0], warnings
     _close(surface["color"], 0.5)
     # Two images that are looked up differently cannot be multiplied; their means are.
     first, second = tree.node("TexImage"), tree.node("TexImage")
