@@ -374,7 +374,7 @@ def case_the_camera_may_see_another_world() -> None:
         tree.links.new(first, mix.inputs[1])
         tree.links.new(other.outputs[0], mix.inputs[2])
         tree.links.new(mix.outputs[0], output.inputs[0])
-        for integrator in ("path", "segment"):
+        for integrator in ("path", "segment") if kind == "BsdfGlass" else ("path",):
             found = agreement.compare(*agreement.render_both(64, 48, 256, 256, integrator))
             print(kind, integrator)
             _check(found, mean=0.007, blocks=0.02, correlation=0.9995)
