@@ -166,54 +166,44 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Solid:
-    """A colour attribute made of where points are: a place in space, for noise.
+class Projection:
+    """An attribute made of where points are: a UV map, or a colour that is a place in space.
 
-    `space`: as of a `Projection`, or "uv", by the map of the name `uv`. `affine`: likewise.
+    `space`: "object"; "generated": within the mesh's texture space, before modifiers; or "uv", by
+    the map of the name `uv`. `affine`: three rows of four, times these coordinates, of which the
+    first `width` are kept. With `in_layers` the first coordinate grows by 0.5 in every other layer
+    of the third, which are 0.5 high.
     """
 
     space: str
     uv: str
     affine: tuple[float, ...]
+    width: int
+    in_layers: bool = False
 
-    def apply(self, arrays: MeshArrays) -> tuple[np.ndarray, str, np.ndarray | None]:
-        """Three coordinates, the elements that have them, and their indices."""
-        matrix = np.array(self.affine).reshape(3, 4)
-        indices = None
-        if self.space == "uv":
-            maps = arrays.uv_maps()
-            found = [values for name, values in maps if name == self.uv or not self.uv]
-            flat = found[0] if found else np.zeros((len(arrays.mesh.loops), 2), np.float32)
-            points, indices = np.pad(flat, ((0, 0), (0, 1))), arrays.corners
-        else:
-            points = arrays.points if self.space == "object" else arrays.generated()
-        values = (points @ matrix[:, :3].T + matrix[:, 3]).astype(np.float32)
-        return values, "vertex" if indices is None else "corner", indices
-
-
-@dataclass(frozen=True)
-class Projection:
-    """A UV map made of where points are.
-
-    `space`: "object", or "generated": within the mesh's texture space, before modifiers.
-    `affine`: three rows of four, times these coordinates. With `in_layers` the first coordinate
-    grows by 0.5 in every other layer of the third, which are 0.5 high.
-    """
-
-    space: str
-    affine: tuple[float, ...]
-    in_layers: bool
-
-    def apply(self, arrays: MeshArrays) -> tuple[np.ndarray, bool]:
-        """Two coordinates of every point; whether one layer holds them all, where they matter."""
-        points = arrays.points if self.space == "object" else arrays.generated()
+    def apply(self, segue: Any, name: str, arrays: MeshArrays) -> tuple[Any, bool]:
+        """The attribute; whether one layer holds all of it, where they matter."""
+        points, indices = self._points(arrays)
         matrix = np.array(self.affine).reshape(3, 4)
         values = points @ matrix[:, :3].T + matrix[:, 3]
-        if not self.in_layers:
-            return values[:, :2], True
-        layers = np.floor(2.0 * values[:, 2])
-        values[:, 0] += 0.5 * (np.median(layers) % 2)
-        return values[:, :2], bool(layers.min() == layers.max())
+        is_level = True
+        if self.in_layers:
+            layers = np.floor(2.0 * values[:, 2])
+            values[:, 0] += 0.5 * (np.median(layers) % 2)
+            is_level = bool(layers.min() == layers.max())
+        domain = "vertex" if indices is None else "corner"
+        kept = values[:, : self.width].astype(np.float32)
+        return segue.Attribute(name, kept, domain, indices=indices), is_level
+
+    def _points(self, arrays: MeshArrays) -> tuple[np.ndarray, np.ndarray | None]:
+        """Coordinates, and their indices where corners have them."""
+        if self.space == "object":
+            return arrays.points, None
+        if self.space == "generated":
+            return arrays.generated(), None
+        maps = [values for name, values in arrays.uv_maps() if name == self.uv or not self.uv]
+        flat = maps[0] if maps else np.zeros((len(arrays.mesh.loops), 2), np.float32)
+        return np.pad(flat, ((0, 0), (0, 1))), arrays.corners
 
 
 def add_mesh(
@@ -223,7 +213,7 @@ def add_mesh(
     *,
     readings: Mapping[str, Reading],
     uvs: Collection[str],
-    projections: Mapping[str, Projection | Solid],
+    projections: Mapping[str, Projection],
     log: ExportLog,
 ) -> int:
     """Add a mesh with its UV maps, other attributes that are read as `uvs`, and the `readings`.
@@ -243,12 +233,8 @@ def add_mesh(
             values, domain, indices = found
             attributes.append(segue.Attribute(name, values[:, :2], domain, indices=indices))
     for name, projection in projections.items():
-        if isinstance(projection, Solid):
-            values, domain, indices = projection.apply(arrays)
-            attributes.append(segue.Attribute(name, values, domain, indices=indices))
-            continue
-        values, is_level = projection.apply(arrays)
-        attributes.append(segue.Attribute(name, values.astype(np.float32), "vertex"))
+        attribute, is_level = projection.apply(segue, name, arrays)
+        attributes.append(attribute)
         if not is_level:
             log.warn(
                 f"Mesh '{arrays.mesh.name}': a checker in space is not supported, it does not "

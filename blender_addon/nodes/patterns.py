@@ -88,8 +88,8 @@ def gradient(
         raise UnsupportedError(f"the {node.gradient_type.lower().replace('_', ' ')} gradient")
     curve, row = _GRADIENTS[node.gradient_type]
     # From the middle of the first texel to that of the last.
-    place = _place(ev, node, stack).along(np.array(row) * (_SIZE - 1) / _SIZE)
-    place = place.along((1.0, 0.0, 0.0, 0.5 / _SIZE))
+    along = np.array(row) * (_SIZE - 1) / _SIZE + np.array([0.0, 0.0, 0.0, 0.5 / _SIZE])
+    place = _place(ev, node, stack).along(along)
     return _shown(_row(ev, place, curve(np.linspace(0.0, 1.0, _SIZE)), "clamp"), output)
 
 
@@ -118,10 +118,8 @@ def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, sta
         ev.warn(node, "coloured noise", "grey noise is used")
     place = _place(ev, node, stack).scaled(ev.number(node.inputs["Scale"], stack))
     numbers = [
-        ev.number(node.inputs[name], stack) if name in node.inputs else default
-        for name, default in (
-            *(("Detail", 2.0), ("Roughness", 0.5), ("Lacunarity", 2.0), ("Distortion", 0.0)),
-        )
+        ev.number(node.inputs[name], stack)
+        for name in ("Detail", "Roughness", "Lacunarity", "Distortion")
     ]
     sampling = Sampling("noise", tuple(numbers), ev.textures.solid(place), "clamp")
     ramp = Baked("Noise", np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[None, :, None])

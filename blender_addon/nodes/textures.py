@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..export.images import Pixels, read_image
-from ..export.mesh import Projection, Reading, Solid
+from ..export.mesh import Projection, Reading
 from ..log import ExportLog
 from .coordinates import Coordinates
 from .values import (
@@ -68,8 +68,8 @@ class TextureStore:
         # that the scene knows it by.
         self.uvs: set[str] = set()
         self.readings: dict[str, Reading] = {}
-        # UV maps that are made of where the points of meshes are.
-        self.projections: dict[str, Projection | Solid] = {}
+        # Attributes that are made of where the points of meshes are.
+        self.projections: dict[str, Projection] = {}
         # Those that were asked for since this was last cleared.
         self.asked: set[str] = set()
 
@@ -94,16 +94,15 @@ class TextureStore:
             shift = 0.5 * (np.floor(2.0 * depth[3]) % 2) if in_layers else 0.0
             transform = place.uv_transform()
             return place.uv, (*transform[:2], transform[2] + shift, *transform[3:])
-        rows = tuple(float(value) for value in place.matrix[:3].ravel())
-        name = self._projected(Projection(place.space, rows, in_layers))
-        return name, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        return self._projected(place, 2, in_layers), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
     def solid(self, place: Coordinates) -> str:
         """The attribute that holds three coordinates."""
-        rows = tuple(float(value) for value in place.matrix[:3].ravel())
-        return self._projected(Solid(place.space, place.uv, rows))
+        return self._projected(place, 3)
 
-    def _projected(self, projection: Projection | Solid) -> str:
+    def _projected(self, place: Coordinates, width: int, in_layers: bool = False) -> str:
+        rows = tuple(float(value) for value in place.matrix[:3].ravel())
+        projection = Projection(place.space, place.uv, rows, width, in_layers)
         known = next((n for n, other in self.projections.items() if other == projection), None)
         name = known or f"{projection.space} ({len(self.projections) + 1})"
         self.projections[name] = projection

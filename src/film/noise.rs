@@ -151,17 +151,15 @@ impl Surroundings {
 
     /// By the half that is darker in all, known by how much its pixels differ, if the other has seen something rare.
     fn of_darker_half(window: Window) -> Self {
-        let [even, odd] = window.halves.map(|sum| sum / window.count);
-        let is_even = even.cmplt(odd);
-        let mean = DVec3::select(is_even, even, odd);
-        let square = DVec3::select(is_even, window.squares[0], window.squares[1]) / window.count;
-        let variance = (square - mean * mean).max(DVec3::ZERO);
+        let is_even = window.halves[0].cmplt(window.halves[1]);
+        // the darker one's first
+        let sorted =
+            |[even, odd]: [DVec3; 2]| [DVec3::select(is_even, even, odd), DVec3::select(is_even, odd, even)];
+        let ([sum, other], [square, other_square]) = (sorted(window.halves), sorted(window.squares));
+        let mean = sum / window.count;
+        let variance = (square / window.count - mean * mean).max(DVec3::ZERO);
         let is_calm = (variance / window.count).powf(0.5).cmple(KNOWN * mean) & mean.cmpgt(DVec3::ZERO);
-        let (other, other_square) = (
-            DVec3::select(is_even, odd, even) * window.count,
-            DVec3::select(is_even, window.squares[1], window.squares[0]),
-        );
-        let is_rare = other.cmpgt(RARE * mean * window.count);
+        let is_rare = other.cmpgt(RARE * sum);
         let is_spread = (other * other).cmpgt(SPREAD * other_square);
         let is_known = is_calm & is_rare & is_spread;
         Self { mean, variance, count: DVec3::splat(window.count), is_known, is_half: is_known }

@@ -127,14 +127,12 @@ impl Materials {
                     false => self.tangent_frame(normal.as_ref(), p).turned(number(rotation)),
                 };
                 let fresnel = Fresnel::constant(color(c).min(Vec3::ONE));
-                let lobe = Reflection::new(ggx, fresnel);
-                let lobe = if *multiscatter { lobe } else { lobe.scattering_once() };
+                let lobe = Reflection::new(ggx, fresnel).with_multiscatter(*multiscatter);
                 builder.push(weight, frame, Lobe::Reflection(lobe));
             }
             Closure::Glass { color: c, roughness, ior, multiscatter, normal } => {
                 let ggx = Ggx::from_roughness(number(roughness));
-                let lobe = Dielectric::new(ggx, sane_ior(number(ior)));
-                let lobe = if *multiscatter { lobe } else { lobe.scattering_once() };
+                let lobe = Dielectric::new(ggx, sane_ior(number(ior))).with_multiscatter(*multiscatter);
                 builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Dielectric(lobe));
             }
             Closure::Refraction { color: c, roughness, ior, normal } => {

@@ -20,6 +20,13 @@ pub struct MeshPoint {
     pub barycentrics: Vec2,
 }
 
+impl MeshPoint {
+    /// Another point of the triangle.
+    fn moved(&self, u: f32, v: f32) -> Self {
+        Self { barycentrics: Vec2::new(u, v), ..*self }
+    }
+}
+
 /// All textures of a scene, with the names of attributes resolved to numbers.
 #[derive(Debug)]
 pub struct TextureSet {
@@ -141,11 +148,8 @@ impl TextureSet {
                 Vec2::new(along(b - a), along(c - a))
             }
             Texture::Noise(t) => {
-                let corner = |u, v| {
-                    let at = MeshPoint { barycentrics: Vec2::new(u, v), ..*at };
-                    self.attribute(texture, &at).unwrap_or(Vec4::ZERO).truncate()
-                };
                 let place = self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate();
+                let corner = |u, v| self.attribute(texture, &at.moved(u, v)).unwrap_or(Vec4::ZERO).truncate();
                 let first = corner(0.0, 0.0);
                 let along = |edge: Vec3| {
                     let length = edge.length();
@@ -157,7 +161,7 @@ impl TextureSet {
                 Vec2::new(along(corner(1.0, 0.0) - first), along(corner(0.0, 1.0) - first))
             }
             Texture::Attribute { .. } => {
-                let corner = |u, v| self.lookup(texture, &MeshPoint { barycentrics: Vec2::new(u, v), ..*at });
+                let corner = |u, v| self.lookup(texture, &at.moved(u, v));
                 let [a, b, c] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)].map(read);
                 Vec2::new(b - a, c - a)
             }

@@ -129,8 +129,8 @@ fn dielectrics() -> Vec<Row> {
 
 fn scattering_once() -> Vec<Row> {
     let rough = Ggx::from_roughness(0.8);
-    let reflection = Reflection::new(rough, Fresnel::constant(Vec3::ONE)).scattering_once();
-    let dielectric = Dielectric::new(rough, 1.5).scattering_once();
+    let reflection = Reflection::new(rough, Fresnel::constant(Vec3::ONE)).with_multiscatter(false);
+    let dielectric = Dielectric::new(rough, 1.5).with_multiscatter(false);
     vec![
         row("reflection once", Lobe::Reflection(reflection), false, true, 0.64),
         row("dielectric once", Lobe::Dielectric(dielectric), false, true, 0.64),

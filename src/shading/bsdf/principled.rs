@@ -130,16 +130,15 @@ impl Principled {
     }
 
     fn reflection(&self, ggx: Ggx, fresnel: Fresnel) -> Lobe {
-        let lobe = Reflection::new(ggx, fresnel);
-        Lobe::Reflection(if self.multiscatter { lobe } else { lobe.scattering_once() })
+        Lobe::Reflection(Reflection::new(ggx, fresnel).with_multiscatter(self.multiscatter))
     }
 
     fn glass(&self) -> Dielectric {
         let f0 = (f0_from_ior(self.ior) * self.specular_tint).min(Vec3::ONE);
         // light that goes in and comes out again is tinted twice
         let tint = self.base_color.map(f32::sqrt);
-        let lobe = Dielectric::tinted(Ggx::from_roughness(self.roughness), self.ior, f0, Vec3::ONE, tint);
-        if self.multiscatter { lobe } else { lobe.scattering_once() }
+        Dielectric::tinted(Ggx::from_roughness(self.roughness), self.ior, f0, Vec3::ONE, tint)
+            .with_multiscatter(self.multiscatter)
     }
 
     /// The dielectric reflection over the diffuse body, where there is one.

@@ -77,9 +77,11 @@ impl Dielectric {
         Self { ggx, eta, split: Split::Fresnel { loss, f0, reflection, transmission } }
     }
 
-    /// The same, losing what is scattered more than once.
-    pub fn scattering_once(mut self) -> Self {
-        if let Split::Fresnel { loss, .. } = &mut self.split {
+    /// The same, which without `multiscatter` loses what is scattered more than once.
+    pub fn with_multiscatter(mut self, multiscatter: bool) -> Self {
+        if let Split::Fresnel { loss, .. } = &mut self.split
+            && !multiscatter
+        {
             *loss = None;
         }
         self

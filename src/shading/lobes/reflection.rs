@@ -24,9 +24,9 @@ impl Reflection {
         Self { ggx, fresnel, scale: ReflectionScale::new(&ggx), regained }
     }
 
-    /// The same, losing what is scattered more than once.
-    pub fn scattering_once(self) -> Self {
-        Self { regained: Vec3::ZERO, ..self }
+    /// The same, which without `multiscatter` loses what is scattered more than once.
+    pub fn with_multiscatter(self, multiscatter: bool) -> Self {
+        if multiscatter { self } else { Self { regained: Vec3::ZERO, ..self } }
     }
 
     #[inline]

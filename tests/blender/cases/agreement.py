@@ -277,6 +277,25 @@ def _floor_of(kind: str, space: str) -> tuple[bpy.types.NodeTree, bpy.types.Node
     return tree, texture, diffuse
 
 
+def _through_ramp(
+    tree: bpy.types.NodeTree, texture: bpy.types.Node, shader: bpy.types.Node, *ends: float
+) -> None:
+    """Leads the texture's factor through a ramp from red at the first of `ends` to the second."""
+    ramp = tree.nodes.new("ShaderNodeValToRGB")
+    ramp.color_ramp.elements[0].color = (0.8, 0.1, 0.1, 1)
+    for element, position in zip(ramp.color_ramp.elements, ends, strict=True):
+        element.position = position
+    factor = next(output for output in texture.outputs if output.type == "VALUE")
+    tree.links.new(factor, ramp.inputs[0])
+    tree.links.new(ramp.outputs["Color"], shader.inputs["Color"])
+
+
+def _check_floor(*what: object) -> None:
+    found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
+    print(*what)
+    _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
+
+
 def case_checkers_and_pictures_by_other_coordinates() -> None:
     """On the floor, and pictures by the object's own coordinates on the ball as well."""
     pixels = np.ones((6, 6, 4), np.float32)
@@ -293,9 +312,7 @@ def case_checkers_and_pictures_by_other_coordinates() -> None:
             texture.inputs["Scale"].default_value = 0.7 if space == "Object" else 3.0
             texture.inputs["Color1"].default_value = (0.8, 0.1, 0.1, 1)
         tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
-        found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
-        print(space, kind)
-        _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
+        _check_floor(space, kind)
 
 
 def case_noise() -> None:
@@ -316,16 +333,9 @@ def case_noise() -> None:
             tree.links.new(texture.outputs[0], bump.inputs["Height"])
             tree.links.new(bump.outputs["Normal"], diffuse.inputs["Normal"])
         else:
-            ramp = tree.nodes.new("ShaderNodeValToRGB")
-            ramp.color_ramp.elements[0].color = (0.8, 0.1, 0.1, 1)
-            ramp.color_ramp.elements[0].position = 0.4
-            ramp.color_ramp.elements[1].position = 0.6
-            tree.links.new(texture.outputs[0], ramp.inputs[0])
-            tree.links.new(ramp.outputs["Color"], diffuse.inputs["Color"])
+            _through_ramp(tree, texture, diffuse, 0.4, 0.6)
         bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
-        found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
-        print(inputs, space, as_bumps)
-        _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
+        _check_floor(inputs, space, as_bumps)
 
 
 def case_gradients_and_waves() -> None:
@@ -345,15 +355,9 @@ def case_gradients_and_waves() -> None:
         if scale:
             texture.inputs["Scale"].default_value = scale
             texture.inputs["Phase Offset"].default_value = 0.7
-        ramp = tree.nodes.new("ShaderNodeValToRGB")
-        ramp.color_ramp.elements[0].color = (0.8, 0.1, 0.1, 1)
-        ramp.color_ramp.elements[0].position = 0.3
-        tree.links.new(texture.outputs[1], ramp.inputs[0])
-        tree.links.new(ramp.outputs["Color"], diffuse.inputs["Color"])
+        _through_ramp(tree, texture, diffuse, 0.3, 1.0)
         bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
-        found = agreement.compare(*agreement.render_both(64, 48, 64, 64))
-        print(kind, properties, space)
-        _check(found, mean=0.004, blocks=0.012, correlation=0.9995)
+        _check_floor(kind, properties, space)
 
 
 def case_the_camera_may_see_another_world() -> None:
