@@ -34,6 +34,7 @@ by_methods!(
         passes_say_what_is_seen,
         cut_outs_and_transparent_surfaces_let_light_through,
         glass_keeps_all_light,
+        absorbing_plates_keep_what_the_law_leaves,
         the_same_seed_gives_the_same_picture_whatever_the_threads,
         a_scene_far_from_the_origin_is_the_same_scene,
     ]
@@ -248,6 +249,34 @@ fn glass_keeps_all_light(method: &str) {
         s.light(r#"{"type":"dome","radiance":[1,1,1]}"#);
         s.camera(DVec3::new(0.0, -5.0, 0.0), DVec3::ZERO, 0.1, "");
         assert_close(surface, mean(&s.render(16, 256, method), Pass::Combined), 1.0, 1e-2);
+    }
+}
+
+fn absorbing_plates_keep_what_the_law_leaves(method: &str) {
+    // a plate under a uniform sky, seen straight through: without an interface, and with one that reflects `r`
+    let (thickness, coefficients) = (0.7, [0.5, 1.0, 3.0]);
+    let r = (0.5f64 / 2.5).powi(2);
+    for (surface, r) in [(r#"{"type":"transparent"}"#, 0.0), (r#"{"type":"glass","ior":1.5}"#, r)] {
+        let mut s = Stage::default();
+        let plate = s.material(&format!(r#"{{"surface":{surface},"absorption":{coefficients:?}}}"#));
+        let corner = |k: u32| glam::Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32) - 0.5;
+        let points: Vec<_> = (0..8).map(corner).collect();
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles: Vec<u32> = sides.iter().flat_map(|&[a, b, c, d]| [a, b, c, a, c, d]).collect();
+        let mesh = s.mesh(&points, &triangles, None);
+        s.place(mesh, plate, DMat4::from_scale(DVec3::new(9.0, 9.0, thickness)));
+        s.light(r#"{"type":"dome","radiance":[1,1,1]}"#);
+        s.camera(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 0.3, r#","type":"orthographic""#);
+        let session = s.render(8, 512, method);
+        let values = session.film().read_pass(Pass::Combined, session.film().rect()).unwrap();
+        for (channel, coefficient) in coefficients.into_iter().enumerate() {
+            let got = values.iter().skip(channel).step_by(4).map(|&v| f64::from(v)).sum::<f64>() / 64.0;
+            let a = f64::exp(-coefficient * thickness);
+            // a geometric series of reflections inside
+            let bounces = 1.0 / (1.0 - r * r * a * a);
+            let expected = (1.0 - r) * (1.0 - r) * a * bounces * (1.0 + r * a) + r;
+            assert_close(&format!("{surface}, channel {channel}"), got, expected, 1e-2);
+        }
     }
 }
 

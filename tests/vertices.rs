@@ -234,6 +234,35 @@ fn half_transparent_surfaces_agree() {
     compare("tinted", &s, SHARP, (24, 24), "");
 }
 
+/// Glass around something else, so that light is inside of the glass both on its way between two of its own points and
+/// from a point of it to another surface.
+#[test]
+fn insides_that_absorb_agree() {
+    const METHODS: Methods = &[
+        ("bdpt", 0.0),
+        ("ppm", 5e-3),
+        ("bpm", 5e-3),
+        ("vcm", 5e-3),
+        ("segment", 5e-3),
+        ("segment-bridge", 5e-3),
+    ];
+    for surface in [
+        r#"{"type":"glass","ior":1.5}"#,
+        r#"{"type":"glass","ior":1.4,"roughness":0.5}"#,
+        r#"{"type":"transparent","color":0.9}"#,
+    ] {
+        let glass = format!(r#"{{"surface":{surface},"absorption":[0.5,1.5,4]}}"#);
+        let mut s = yard(&glass, WALL);
+        let core = s.material(WALL);
+        let (points, triangles) = icosphere(1);
+        let mesh = s.mesh(&points, &triangles, None);
+        let at = DMat4::from_translation(DVec3::new(0.2, 0.1, 0.5)) * DMat4::from_scale(DVec3::splat(0.2));
+        s.place(mesh, core, at);
+        lamp(&mut s);
+        compare(&glass, &s, METHODS, (24, 24), "");
+    }
+}
+
 #[test]
 fn bounces_are_counted_as_in_path_tracing() {
     let mut s = corner(WALL, WALL, false);

@@ -9,6 +9,7 @@ import bpy
 from ..log import ExportLog
 from .closures import BLACK, Closure, ClosureTranslator
 from .evaluate import Evaluator
+from .interior import absorption
 from .radiance import Radiance
 from .textures import TextureStore
 from .tree import is_linked, socket
@@ -55,7 +56,11 @@ class Translator:
             result["surface"] = BLACK
             return result
         owner = f"Material '{material.name}'"
-        result["surface"] = self._surface(owner, output)
+        evaluator = Evaluator(owner, self.textures, self._log)
+        result["surface"] = self._surface(evaluator, output)
+        inside = absorption(evaluator, socket(output, "Volume"))
+        if inside.any():
+            result["absorption"] = inside.tolist()
         # Blender 4.2 moved this switch from Cycles' settings.
         if not getattr(material, "use_transparent_shadow", True) and _lets_through(
             result["surface"]
@@ -65,15 +70,15 @@ class Translator:
             )
         return result
 
-    def _surface(self, owner: str, output: bpy.types.Node) -> dict[str, Any]:
-        surface, volume = socket(output, "Surface"), socket(output, "Volume")
+    def _surface(self, evaluator: Evaluator, output: bpy.types.Node) -> dict[str, Any]:
+        surface = socket(output, "Surface")
         if is_linked(socket(output, "Displacement")):
-            self._log.warn(f"{owner}: displacement is not supported, the surface is left as it is")
-        if is_linked(volume):
-            self._log.warn(f"{owner}: volumes are not supported, the inside is left empty")
-            if not is_linked(surface):
-                return {"type": "transparent", "color": [1.0, 1.0, 1.0]}
-        return ClosureTranslator(Evaluator(owner, self.textures, self._log)).closure(surface)
+            self._log.warn(
+                f"{evaluator.owner}: displacement is not supported, the surface is left as it is"
+            )
+        if is_linked(socket(output, "Volume")) and not is_linked(surface):
+            return {"type": "transparent", "color": [1.0, 1.0, 1.0]}
+        return ClosureTranslator(evaluator).closure(surface)
 
     def world_radiance(self, world: bpy.types.World) -> list[Value]:
         """Radiance of a world with nodes: a colour, or an image looked up by direction.

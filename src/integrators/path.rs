@@ -114,6 +114,7 @@ impl PathWalk<'_, '_> {
                     found += throughput * light.radiance * self.hit_weight(origin, light);
                 });
                 let Some(hit) = hit else { break None };
+                throughput *= world.left_after(&piece, &hit);
                 let choice = if world.needs().transparency { self.sampler.next_1d() } else { 0.0 };
                 match world.shade(&hit, -piece.direction, choice) {
                     Shaded::Through { weight } => {

@@ -3,6 +3,7 @@
 use super::SceneError;
 use super::relief::Relief;
 use super::value::Value;
+use glam::Vec3;
 use serde::Deserialize;
 
 /// Reflectance of metal at grazing angles.
@@ -188,6 +189,8 @@ pub struct Material {
     pub surface: Closure,
     /// Share of the surface that is there; the rest is a hole.
     pub opacity: Value,
+    /// Absorption coefficient of the inside of objects, per scene unit.
+    pub absorption: Vec3,
     /// Value of the Material Index pass.
     pub pass_index: u32,
 }
@@ -198,6 +201,8 @@ struct Json {
     surface: Closure,
     #[serde(default = "one")]
     opacity: Value,
+    #[serde(default)]
+    absorption: [f32; 3],
     #[serde(default)]
     pass_index: u32,
 }
@@ -212,6 +217,7 @@ impl Default for Material {
             name: "default".into(),
             surface: Closure::Diffuse { color: eight_tenths(), roughness: zero(), normal: None },
             opacity: one(),
+            absorption: Vec3::ZERO,
             pass_index: 0,
         }
     }
@@ -225,8 +231,12 @@ impl Material {
         if j.surface.depth() > MAX_DEPTH {
             return Err(fail(format!("its tree of closures is deeper than {MAX_DEPTH}")));
         }
-        let material =
-            Self { name: name.into(), surface: j.surface, opacity: j.opacity, pass_index: j.pass_index };
+        let Json { surface, opacity, absorption, pass_index } = j;
+        let absorption = Vec3::from(absorption);
+        if !(absorption.is_finite() && absorption.min_element() >= 0.0) {
+            return Err(fail("its absorption is negative or not finite".to_string()));
+        }
+        let material = Self { name: name.into(), surface, opacity, absorption, pass_index };
         let mut problem = None;
         material.for_each_value(&mut |v| {
             problem = problem.take().or(match v {

@@ -6,6 +6,7 @@ use super::material::Closure;
 use super::texture::Texture;
 use super::value::{Channel, Value};
 use super::{Material, Scene};
+use glam::Vec3;
 use serde::Serialize;
 
 /// Features that a scene uses. A feature that is `false` is left out of the render.
@@ -29,6 +30,8 @@ pub struct Needs {
     pub infinite_lights: bool,
     /// Some surface may be a mirror or smooth glass.
     pub mirrors: bool,
+    /// The inside of some object absorbs.
+    pub absorption: bool,
 }
 
 impl Needs {
@@ -43,6 +46,7 @@ impl Needs {
         light_shapes: true,
         infinite_lights: true,
         mirrors: true,
+        absorption: true,
     };
 
     /// What the instances, lights and camera of a scene need.
@@ -74,7 +78,7 @@ impl Needs {
                 found
             }),
             normal_maps: any_closure(&|c| c.reliefs().next().is_some()),
-            emissive_surfaces: any_closure(&may_emit),
+            emissive_surfaces: materials.iter().any(|m| may_emit(m)),
             light_shapes: scene.lights.iter().any(|l| {
                 !matches!(
                     l.kind,
@@ -86,6 +90,7 @@ impl Needs {
                 .iter()
                 .any(|l| matches!(l.kind, LightKind::Distant { .. } | LightKind::Dome { .. })),
             mirrors: any_closure(&may_be_mirror),
+            absorption: materials.iter().any(|m| m.absorption != Vec3::ZERO),
         }
     }
 
@@ -100,6 +105,7 @@ impl Needs {
             (self.emissive_surfaces, "emission of surfaces: no used material emits"),
             (self.light_shapes, "intersection with light shapes: no light has one"),
             (self.infinite_lights, "environment: no light is infinitely far away"),
+            (self.absorption, "absorption along rays: the inside of no object absorbs"),
             (self.mirrors, "specular chains: no used surface is a mirror or smooth glass"),
         ]
         .into_iter()
@@ -132,13 +138,17 @@ pub fn may_be_transparent(material: &Material, scene: &Scene) -> bool {
     found
 }
 
-/// Whether a closure may emit.
-pub fn may_emit(closure: &Closure) -> bool {
-    match closure {
-        Closure::Emission { color, strength } => !color.is(0.0) && !strength.is(0.0),
-        Closure::Principled(p) => !p.emission_color.is(0.0) && !p.emission_strength.is(0.0),
-        _ => false,
-    }
+/// Whether a material may emit.
+pub fn may_emit(material: &Material) -> bool {
+    let mut found = false;
+    material.surface.for_each(&mut |c| {
+        found |= match c {
+            Closure::Emission { color, strength } => !color.is(0.0) && !strength.is(0.0),
+            Closure::Principled(p) => !p.emission_color.is(0.0) && !p.emission_strength.is(0.0),
+            _ => false,
+        }
+    });
+    found
 }
 
 /// Whether a closure may have lobes that are Dirac deltas, straight passage apart.
@@ -199,7 +209,7 @@ mod tests {
         assert!(
             !n.emissive_surfaces && !n.transparency && !n.light_shapes && !n.infinite_lights && !n.textures
         );
-        assert_eq!(n.left_out().len(), 9);
+        assert_eq!(n.left_out().len(), 10);
         // instances of none of it: still not needed
         b.add_instances(group(&[lamp]), &[]).unwrap();
         assert!(!super::Needs::of(&b.build().unwrap()).emissive_surfaces);

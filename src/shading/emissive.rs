@@ -27,15 +27,7 @@ pub(super) fn emissive_triangles(
     materials: &Materials,
     warnings: &mut Warnings,
 ) -> Vec<MeshTriangle> {
-    let emits: Vec<bool> = scene
-        .materials
-        .iter()
-        .map(|m| {
-            let mut found = false;
-            m.surface.for_each(&mut |c| found |= may_emit(c));
-            found
-        })
-        .collect();
+    let emits: Vec<bool> = scene.materials.iter().map(may_emit).collect();
     let mut triangles = Vec::new();
     for (i, instance) in scene.instances.iter().enumerate() {
         let group = &scene.groups[instance.group as usize];

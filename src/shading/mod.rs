@@ -7,6 +7,8 @@ pub mod lobes;
 mod class;
 mod emissive;
 mod first_hit;
+mod interior;
+mod layers;
 mod light_ray;
 mod material;
 mod ray;
@@ -18,6 +20,7 @@ mod visibility;
 mod world;
 
 pub use class::SurfaceClass;
+pub use layers::Layer;
 pub use light_ray::{LightRay, SourceDensity};
 pub use ray::{LightPoint, LightSample, Piece};
 pub use sensor::{CameraRay, Sensor, SensorView};

@@ -1,6 +1,7 @@
 //! Rays as integrators follow them, and light met or sampled along them.
 
 use super::emitters::EmitterHit;
+use super::interior::interior;
 use super::sensor::CameraRay;
 use super::surface::SurfacePoint;
 use crate::accel::Ray;
@@ -16,6 +17,8 @@ pub struct Piece {
     pub direction: Vec3,
     /// Distance from where the ray began to where this piece does.
     pub(super) travelled: f32,
+    /// The material of the surface that the piece leaves, if it does on its back.
+    pub(super) inside: Option<u32>,
 }
 
 /// Light met along a ray.
@@ -79,17 +82,17 @@ impl Piece {
     /// The first piece of a camera ray.
     pub fn from_camera(c: &CameraRay) -> Self {
         let ray = Ray { origin: c.origin, direction: c.direction, t_min: c.range[0], t_max: c.range[1] };
-        Self { ray, direction: c.direction, travelled: 0.0 }
+        Self { ray, direction: c.direction, travelled: 0.0, inside: None }
     }
 
     /// The first piece of a ray that leaves an emitter.
     pub(super) fn along(ray: Ray, direction: Vec3) -> Self {
-        Self { ray, direction, travelled: 0.0 }
+        Self { ray, direction, travelled: 0.0, inside: None }
     }
 
     /// The first piece of a ray that leaves a surface.
     pub fn leaving(p: &SurfacePoint, direction: Vec3) -> Self {
-        Self { ray: p.place.spawn(direction), direction, travelled: 0.0 }
+        Self { ray: p.place.spawn(direction), direction, travelled: 0.0, inside: interior(p, direction) }
     }
 
     /// The next piece, beyond a surface that was passed.
@@ -97,6 +100,11 @@ impl Piece {
         let ray = p.place.spawn(self.direction);
         let step = (ray.origin - self.ray.origin).length();
         let ray = Ray { t_max: self.ray.t_max - step, ..ray };
-        Self { ray, direction: self.direction, travelled: self.travelled + step }
+        Self {
+            ray,
+            direction: self.direction,
+            travelled: self.travelled + step,
+            inside: interior(p, self.direction),
+        }
     }
 }

@@ -57,6 +57,13 @@ pub fn normalize_any(v: Vec3) -> Vec3 {
     if scale > 0.0 && scale.is_finite() { (v / scale).normalize() } else { Vec3::ZERO }
 }
 
+/// The unit normal that a mesh's own one of any length makes, on the side of the geometric one.
+pub fn shading_normal(own: Vec3, geometric: Vec3) -> Vec3 {
+    let n = normalize_any(own);
+    // no normal there (zero, not finite): the geometric one
+    if n.length_squared() > 0.5 { n * 1f32.copysign(n.dot(geometric)) } else { geometric }
+}
+
 impl SurfacePoint {
     /// Where to find it again.
     pub fn address(&self) -> Address {
@@ -74,9 +81,7 @@ impl SurfacePoint {
             None => place.normal,
             Some(n) => {
                 let matrix = Mat3::from(scene.instances[hit.instance as usize].to_world.matrix3);
-                let n = normalize_any(normal_matrix(matrix) * interpolate(n, mesh, &at));
-                // no normal there (zero, not finite): the geometric one
-                if n.length_squared() > 0.5 { n * 1f32.copysign(n.dot(place.normal)) } else { place.normal }
+                shading_normal(normal_matrix(matrix) * interpolate(n, mesh, &at), place.normal)
             }
         };
         Self {

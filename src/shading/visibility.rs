@@ -1,5 +1,6 @@
 //! What lies between two points of a path: how much of the light comes through.
 
+use super::interior::interior;
 use super::ray::LightSample;
 use super::surface::SurfacePoint;
 use super::world::World;
@@ -11,12 +12,12 @@ impl World {
     /// Share of light that comes through from a sampled light to a surface point. Adds the rays it takes
     /// to `rays`.
     pub fn transmittance(&self, from: &SurfacePoint, light: &LightSample, rays: &mut u64) -> Vec3 {
-        self.comes_through(from, false, rays, |p| light.ray_from(p))
+        self.comes_through(from, None, false, rays, |p| light.ray_from(p))
     }
 
     /// The same between two surface points.
     pub fn transmittance_between(&self, from: &SurfacePoint, to: &SurfacePoint, rays: &mut u64) -> Vec3 {
-        self.comes_through(from, false, rays, |p| p.segment_to(&to.place))
+        self.comes_through(from, Some(to), false, rays, |p| p.segment_to(&to.place))
     }
 
     /// The same from a surface point to where the camera's sight begins, `end`. What the camera does not see
@@ -26,26 +27,30 @@ impl World {
         if hides && !self.scene.group(from.instance).camera_visible {
             return Vec3::ZERO;
         }
-        self.comes_through(from, hides, rays, |p| p.segment_to_point(end))
+        self.comes_through(from, None, hides, rays, |p| p.segment_to_point(end))
     }
 
-    /// `for_camera`: past what the camera does not see. `ray_from`: the ray that is left from a point on it.
+    /// `to`: the surface at its end, unless that is a light or the camera. `for_camera`: past what the camera does not
+    /// see. `ray_from`: the ray that is left from a point on it.
     fn comes_through(
         &self,
         from: &SurfacePoint,
+        to: Option<&SurfacePoint>,
         for_camera: bool,
         rays: &mut u64,
         ray_from: impl Fn(&Place) -> Ray,
     ) -> Vec3 {
         let mut ray = ray_from(&from.place);
         *rays += 1;
+        let last = to.and_then(|to| interior(to, -ray.direction));
+        let left = |ray: &Ray, start, end| self.left_between(start, end, length_squared(ray).sqrt());
         let counts = |h: &Hit| !for_camera || self.scene.group(h.instance).camera_visible;
         if !self.needs().transparency {
             let occluded = match for_camera {
                 false => self.accel.occluded(&ray),
                 true => self.accel.occluded_where(&ray, &counts),
             };
-            return if occluded { Vec3::ZERO } else { Vec3::ONE };
+            return if occluded { Vec3::ZERO } else { left(&ray, interior(from, ray.direction), last) };
         }
         let opaque =
             |h: &Hit| !self.materials.may_be_transparent(self.scene.material_index(h.instance, h.triangle));
@@ -53,7 +58,7 @@ impl World {
         if self.accel.occluded_where(&ray, &|h| opaque(h) && counts(h)) {
             return Vec3::ZERO;
         }
-        let mut weight = Vec3::ONE;
+        let (mut weight, mut inside) = (Vec3::ONE, interior(from, ray.direction));
         while let Some(hit) = self.accel.closest_where(&ray, &counts) {
             let p = SurfacePoint::new(&self.scene, &self.accel, &hit);
             let rest = ray_from(&p.place);
@@ -61,14 +66,16 @@ impl World {
             if rest.t_max.is_finite() && length_squared(&rest) >= length_squared(&ray) {
                 return weight;
             }
+            let piece = Ray { t_max: hit.t, ..ray };
+            weight *= left(&piece, inside, interior(&p, -ray.direction));
             weight *= self.materials.transparency(p.material, &p.at);
             if weight == Vec3::ZERO {
                 return weight;
             }
             *rays += 1;
-            ray = rest;
+            (ray, inside) = (rest, interior(&p, rest.direction));
         }
-        weight
+        weight * left(&ray, inside, last)
     }
 }
 

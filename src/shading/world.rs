@@ -11,7 +11,8 @@ use super::surface::{Address, SurfacePoint, place};
 use super::texture::{MeshPoint, interpolate};
 use crate::accel::offset::SurfacePoint as Place;
 use crate::accel::{Accel, AccelError, Hit, InstanceGeometry, MeshGeometry, Ray};
-use crate::scene::{Needs, Scene, SceneError, Warnings};
+use crate::scene::needs::may_emit;
+use crate::scene::{Material, Needs, Scene, SceneError, Warnings};
 use glam::{DVec2, DVec3, Vec2, Vec2Swizzles, Vec3};
 use std::sync::Arc;
 use std::time::Instant;
@@ -44,6 +45,8 @@ pub struct World {
     pub(super) materials: Materials,
     pub(super) emitters: Emitters,
     classes: Vec<SurfaceClass>,
+    /// Absorption coefficient inside of objects, by material, per scene unit.
+    pub(super) absorption: Vec<Vec3>,
     needs: Needs,
     warnings: Warnings,
     costs: Vec<BuildCost>,
@@ -137,8 +140,20 @@ impl World {
             warnings.add("scene", "nothing emits light: the picture will be black", 1);
         }
         let classes = scene.materials.iter().map(SurfaceClass::of).collect();
+        let absorption = absorption_coefficients(&scene, &mut warnings);
         let most_survival = survival_for(PATH_LENGTHS[0]);
-        Ok(Self { scene, accel, materials, emitters, classes, needs, warnings, costs, most_survival })
+        Ok(Self {
+            scene,
+            accel,
+            materials,
+            emitters,
+            classes,
+            absorption,
+            needs,
+            warnings,
+            costs,
+            most_survival,
+        })
     }
 
     /// For so many paths from the camera, or from the lights, that are kept at a time: the fewer, the longer they may
@@ -254,17 +269,6 @@ impl World {
         !self.accel.occluded(&Ray { t_max: 1.0, ..Ray::new(from, to - from) })
     }
 
-    /// Calls `found` for the surfaces between two points in space, the first `most` of them.
-    pub fn for_each_surface(&self, from: Vec3, to: Vec3, most: u32, mut found: impl FnMut(&SurfacePoint)) {
-        let mut ray = Ray { t_max: 1.0, ..Ray::new(from, to - from) };
-        for _ in 0..most {
-            let Some(hit) = self.accel.closest(&ray) else { return };
-            let p = SurfacePoint::new(&self.scene, &self.accel, &hit);
-            found(&p);
-            ray = p.place.segment_to_point(to);
-        }
-    }
-
     /// Texture coordinates of a surface point.
     pub fn uv(&self, p: &SurfacePoint) -> Vec2 {
         self.materials.uv(&p.at)
@@ -344,12 +348,13 @@ impl World {
         if !self.needs.light_shapes {
             return;
         }
-        let Piece { ray, direction, travelled } = *piece;
+        let Piece { ray, direction, travelled, inside } = *piece;
         let t_max = end.map_or(ray.t_max, |p| (p.place.position - ray.origin).dot(direction));
         self.emitters.for_each_hit(ray.origin, direction, t_max, |hit| {
             if hit.distance >= ray.t_min && self.emitters.is_seen(hit.emitter, from_camera) {
+                let radiance = hit.radiance * self.left_between(inside, None, hit.distance);
                 let hit = EmitterHit { distance: travelled + hit.distance, ..hit };
-                found(LightPoint { radiance: hit.radiance, direction, hit });
+                found(LightPoint { radiance, direction, hit });
             }
         });
     }
@@ -367,9 +372,10 @@ impl World {
             return;
         }
         let direction = piece.direction;
+        let left = self.left_between(piece.inside, None, f32::INFINITY);
         self.emitters.for_each_infinite(piece.ray.origin, direction, |hit| {
             if self.emitters.is_seen(hit.emitter, from_camera) {
-                found(LightPoint { radiance: hit.radiance, direction, hit });
+                found(LightPoint { radiance: hit.radiance * left, direction, hit });
             }
         });
     }
@@ -444,6 +450,18 @@ impl World {
             false => emission,
         }
     }
+}
+
+/// Absorption coefficients by material. Sampled points of surfaces that emit do not know what is behind them.
+fn absorption_coefficients(scene: &Scene, warnings: &mut Warnings) -> Vec<Vec3> {
+    let coefficient = |m: &Material| {
+        if m.absorption == Vec3::ZERO || !may_emit(m) {
+            return m.absorption;
+        }
+        warnings.add(format!("material {:?}", m.name), "it emits light, so its inside absorbs none", 1);
+        Vec3::ZERO
+    };
+    scene.materials.iter().map(coefficient).collect()
 }
 
 fn survival_for(length: f32) -> f32 {

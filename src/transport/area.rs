@@ -26,7 +26,7 @@ const NEAR_PLANE: f32 = 0.05;
 /// lie along any axis.
 const STEEP: f32 = 0.8;
 /// Most surfaces that are looked at below one coverage point.
-const LAYERS: u32 = 64;
+const LAYERS: usize = 64;
 
 /// The part of space that a cluster takes.
 pub struct Cell<'a> {
@@ -120,30 +120,28 @@ impl Cell<'_> {
                 std::mem::swap(&mut top, &mut bottom);
             }
             let (mut is_first, mut is_there) = (true, false);
-            // the upper side of something too thin for points above its lower side to be inside: depth, orientation
+            // the upper side of something too thin for points above its lower side to be inside: depth in edges, orientation
             let mut upper: Option<(f32, bool)> = None;
             world.for_each_surface(top, bottom, LAYERS, |p| {
                 // where nothing divides the cluster, only what bends away or lies below something may be out of sight
-                let rise = (p.place.position - at).dot(plane);
+                let rise = (p.position - at).dot(plane);
                 let is_doubtful = self.is_divided || !is_first || rise.abs() > NEAR_PLANE * edge;
                 is_first = false;
-                let class = world.class(p.material);
                 let faces = p.ns.dot(ns) > 0.0;
-                let side = match class == SurfaceClass::Transmitting || faces {
+                let side = match p.class == SurfaceClass::Transmitting || faces {
                     true => p.ns,
                     false => -p.ns,
                 };
-                let there = class == self.representative.class
+                let there = p.class == self.representative.class
                     && self.grid.bin(side) == bin
-                    && self.grid.voxel(p.place.position) == self.voxel
-                    && (!is_doubtful || belongs(p.place.position, side));
-                let depth = (p.place.position[axis] - top[axis]).abs();
-                let is_lower = upper.is_some_and(|(d, f)| f != faces && depth - d < NEAR_PLANE * edge);
-                upper = (there && !is_lower).then_some((depth, faces));
+                    && self.grid.voxel(p.position) == self.voxel
+                    && (!is_doubtful || belongs(p.position, side));
+                let is_lower = upper.is_some_and(|(d, f)| f != faces && p.depth - d < NEAR_PLANE);
+                upper = (there && !is_lower).then_some((p.depth, faces));
                 if there && !is_lower {
                     is_there = true;
                     // a surface seen edge-on would count without bound
-                    let slope = 1.0 / p.place.normal.abs().dot(shares).max(0.05);
+                    let slope = 1.0 / p.normal.abs().dot(shares).max(0.05);
                     sum += slope;
                     squares += slope * slope;
                 }

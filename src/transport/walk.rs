@@ -119,6 +119,7 @@ impl Follow<'_> {
                 witness.escaped(&chain);
                 return (chain, None);
             };
+            chain.throughput *= world.left_after(&piece, &hit);
             let wo = -piece.direction;
             let choice = if world.needs().transparency { sampler.next_1d() } else { 0.0 };
             let (vertex, opacity) = match world.shade(&hit, wo, choice) {

@@ -459,6 +459,28 @@ def case_media_are_as_bright_as_in_cycles() -> None:
         _check(found, mean=0.01, blocks=0.03, correlation=0.995)
 
 
+def case_insides_absorb() -> None:
+    """Liquid in glass, a core in frosted glass, and a volume without a surface."""
+    for kind, roughness in (("BsdfGlass", 0.0), ("BsdfGlass", 0.2), (None, 0.0)):
+        _stage("BsdfDiffuse", {"Color": (0.6, 0.5, 0.4, 1)})
+        if kind:
+            shell = builders.shader_material(kind, "Shell", IOR=1.3, Roughness=roughness)
+        else:
+            shell, _, _ = builders.material("Shell")
+        tree = shell.node_tree
+        volume = tree.nodes.new("ShaderNodeVolumeAbsorption")
+        volume.inputs["Color"].default_value = (0.9, 0.5, 0.1, 1.0)
+        volume.inputs["Density"].default_value = 2.0
+        output = tree.get_output_node("CYCLES")
+        tree.links.new(volume.outputs[0], output.inputs["Volume"])
+        ball = builders.sphere("Shell", 1.3, 64, 32)
+        ball.materials.append(shell)
+        builders.link(ball, matrix=Matrix.Translation((0, 0, 1.35)))
+        found = agreement.compare(*agreement.render_both(64, 48, 256, 256))
+        print(kind, roughness)
+        _check(found, mean=0.01, blocks=0.03, correlation=0.995)
+
+
 def case_lights_one_by_one() -> None:
     """Every kind of light, alone, over a floor with a cube."""
     soft = {"use_soft_falloff": False}

@@ -469,6 +469,36 @@ def case_volume_and_displacement_are_named() -> None:
     assert len(warnings) == 2, warnings
 
 
+def case_insides_absorb() -> None:
+    tree = Tree()
+    volume = tree.output.inputs["Volume"]
+    plain = tree.node("VolumeAbsorption", Color=(0.9, 0.5, 1.5, 1), Density=2.0)
+    tree.link(plain.outputs[0], volume)
+
+    def found() -> tuple[list[float], list[str]]:
+        scene, warnings = builders.export()
+        return scene.materials[0][1].get("absorption", [0.0] * 3), warnings
+
+    coefficient, warnings = found()
+    _close(coefficient, (0.2, 1.0, 0.0))
+    assert not warnings, warnings
+    # Half of it, and half of a principled one that also scatters.
+    mix = tree.node("MixShader", Fac=0.5)
+    fog = tree.node("VolumePrincipled", Density=4.0, Color=(0.5, 0, 0, 1))
+    fog.inputs["Absorption Color"].default_value = (0.25, 0.25, 1, 1)
+    for shader, entry in ((plain, mix.inputs[1]), (fog, mix.inputs[2]), (mix, volume)):
+        tree.link(shader.outputs[0], entry)
+    coefficient, warnings = found()
+    _close(coefficient, (0.1 + 0.5, 0.5 + 1.0, 0.0))
+    assert len(warnings) == 1 and "scattering of volumes" in warnings[0], warnings
+    # Noise in the density is averaged, and said to be.
+    noise = tree.node("TexNoise")
+    tree.link(noise.outputs[0], plain.inputs["Density"])
+    tree.link(plain.outputs[0], volume)
+    coefficient, warnings = found()
+    assert coefficient[1] > 0.0 and len(warnings) == 1, (coefficient, warnings)
+
+
 def case_pass_index_and_material_without_nodes() -> None:
     tree = Tree()
     tree.material.pass_index = 12
