@@ -6,15 +6,23 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ..log import ExportLog
 from ..nodes.material import Translator
-from ..nodes.values import AttributeValue, Constant, ImageValue, Value, negative
+from ..nodes.values import AttributeValue, Constant, ImageValue, Sampling, Value, negative
 from .lights import ALL_BOUNCES
+from .panorama import Panorama, panorama
 
 # Columns: where the axes of the ABI's dome lie in Blender's world. Blender's map has +X in its
 # centre column, +Y a quarter to the left and +Z on top.
 _BLENDER_FROM_DOME = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+# How a map that shows the world around it is looked up.
+_AS_IT_IS = Sampling("environment", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))
+
+# Sizes of a mapping along its axes that differ less are equal but for rounding.
+_LARGEST_STRETCH = 1.0 + 1e-4
 
 _RAY_FLAGS = {
     "diffuse": "diffuse",
@@ -25,21 +33,52 @@ _RAY_FLAGS = {
 
 
 def world_json(
-    world: bpy.types.World | None, translator: Translator, log: ExportLog
+    world: bpy.types.World | None, frame: int, translator: Translator, log: ExportLog
 ) -> list[dict[str, Any]]:
-    """The dome light of a world, and a second where the camera sees another; none is black."""
+    """The lights of a world: a dome, and a second where the camera sees another; none is black.
+
+    Skies with a sun have it as a light of its own.
+    """
     if world is None:
         return []
+    suns: list[dict[str, Any]] = []
     if not world.use_nodes or world.node_tree is None:
         values: list[Value] = [Constant.color(world.color)]
     else:
-        values = translator.world_radiance(world)
+        values, simplified = translator.world_radiance(world)
+        if simplified or any(_is_stretched(value) for value in values):
+            made = [panorama(world, frame, k == len(values) - 1, log) for k in range(len(values))]
+            if None in made:
+                for text in simplified:
+                    log.warn(text)
+            else:
+                values = [_shown(p) for p in made]
+                suns = [p.sun for p in made]
     visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
     seen = [{"camera_visible": visible}]
     if len(values) > 1:
         seen = [{"camera_visible": False}, {"camera_only": True}]
-    domes = [_dome(world, value, translator, log) for value in values[: 1 + int(visible)]]
-    return [dome | by for dome, by in zip(domes, seen, strict=False) if dome]
+    lights = []
+    for value, sun, by in zip(values[: 1 + int(visible)], suns or [None, None], seen, strict=False):
+        dome = _dome(world, value, translator, log)
+        lights += [light | by for light in (dome, sun and _sun(sun)) if light]
+    return lights
+
+
+def _shown(world: Panorama) -> Value:
+    if not world.pixels.any():
+        return Constant.color((0.0, 0.0, 0.0))
+    return ImageValue(world, _AS_IT_IS)
+
+
+def _sun(sun: dict[str, Any]) -> dict[str, Any]:
+    turn = Vector(sun["direction"]).to_track_quat("Z", "Y").to_matrix().to_4x4()
+    return {
+        "type": "distant",
+        "irradiance": sun["irradiance"],
+        "angle": sun["angle"],
+        "transform": [number for row in turn for number in row],
+    }
 
 
 def _dome(
@@ -80,6 +119,14 @@ def _warn_world(name: str, world: bpy.types.World, log: ExportLog) -> None:
         log.warn(f"{name}: a limit of bounces of a world is not supported, all are followed")
 
 
+def _is_stretched(value: Value) -> bool:
+    """Whether it is a map that no dome can be turned to."""
+    if not isinstance(value, ImageValue):
+        return False
+    sizes = np.linalg.svd(np.array(value.sampling.matrix).reshape(3, 3), compute_uv=False)
+    return bool(sizes[0] > sizes[-1] * _LARGEST_STRETCH)
+
+
 def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> list[float]:
     """Light to world for a map that is looked up at `matrix` times the direction."""
     lookup = np.array(matrix).reshape(3, 3)
@@ -88,7 +135,7 @@ def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> lis
     if sizes[-1] <= 1e-6 * sizes[0]:
         log.warn(f"World '{name}': the mapping of its image is flat, it is left out")
         u, vt = np.eye(3), np.eye(3)
-    elif sizes[0] > sizes[-1] * (1.0 + 1e-4):
+    elif sizes[0] > sizes[-1] * _LARGEST_STRETCH:
         log.warn(
             f"World '{name}': a mapping that stretches the image is not supported, "
             "only its rotation is used"
@@ -106,10 +153,11 @@ def export_world(
     if not view_layer.use_sky:
         return
     world = getattr(view_layer, "world_override", None) or depsgraph.scene_eval.world
-    domes = world_json(world, translator, log)
-    for dome in domes:
-        scene.add_light(world.name, dome)
-    is_seen = any(dome.get("camera_visible", True) for dome in domes)
+    frame = depsgraph.scene_eval.frame_current
+    lights = world_json(world, frame, translator, log)
+    for light in lights:
+        scene.add_light(world.name, light)
+    is_seen = any(light.get("camera_visible", True) for light in lights)
     if is_seen and not depsgraph.scene_eval.render.film_transparent and view_layer.use_pass_emit:
         log.warn(
             f"View layer '{view_layer.name}': the Emission pass holds the background of the world "

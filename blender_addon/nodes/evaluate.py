@@ -66,14 +66,24 @@ class Evaluator:
         self.camera = camera
         #: Whether a value depends on that.
         self.tells_camera = False
+        #: What is said where a pattern of a world is simplified: it may yet become a picture.
+        self.simplified: list[str] = []
         self._memo: dict[tuple, Value] = {}
 
     def warn(self, node: bpy.types.Node, what: str, instead: str) -> None:
         """Say that `what` of a node is not supported and what is used `instead`."""
+        self.log.warn(self._text(node, what, instead))
+
+    def simplify(self, node: bpy.types.Node, what: str, instead: str) -> None:
+        """The same of a pattern."""
+        if self.world:
+            self.simplified.append(self._text(node, what, instead))
+        else:
+            self.warn(node, what, instead)
+
+    def _text(self, node: bpy.types.Node, what: str, instead: str) -> str:
         label = "" if node.bl_label in node.name else f" ({node.bl_label})"
-        self.log.warn(
-            f"{self.owner}: node '{node.name}'{label}: {what} is not supported, {instead}"
-        )
+        return f"{self.owner}: node '{node.name}'{label}: {what} is not supported, {instead}"
 
     def value(self, entry: bpy.types.NodeSocket, stack: Stack) -> Value:
         """The value at an input, of the input's kind."""
@@ -99,7 +109,7 @@ class Evaluator:
         try:
             return combine(node.name, kind, function, *values)
         except UnsupportedError as reason:
-            self.warn(node, str(reason), "averages are used")
+            self.simplify(node, str(reason), "averages are used")
             return combine(node.name, kind, function, *(average(value) for value in values))
 
     def number(self, entry: bpy.types.NodeSocket, stack: Stack) -> float:
@@ -111,7 +121,7 @@ class Evaluator:
         value = self.value(entry, stack)
         if isinstance(value, Constant):
             return value
-        self.warn(entry.node, f"a texture at '{entry.name}'", "its average is used")
+        self.simplify(entry.node, f"a texture at '{entry.name}'", "its average is used")
         return average(value)
 
     @staticmethod
@@ -143,7 +153,9 @@ class Evaluator:
             rounded = ", ".join(
                 f"{number:.3g}" for number in stand_in.rgb[: 1 if stand_in.kind == "float" else 3]
             )
-            self.warn(node, str(reason), f"{rounded} is used")
+            is_pattern = (node.bl_idname, output.identifier) not in _STAND_INS
+            tell = self.simplify if is_pattern else self.warn
+            tell(node, str(reason), f"{rounded} is used")
             return stand_in
 
     def _stand_in(

@@ -80,24 +80,26 @@ class Translator:
             return {"type": "transparent", "color": [1.0, 1.0, 1.0]}
         return ClosureTranslator(evaluator).closure(surface)
 
-    def world_radiance(self, world: bpy.types.World) -> list[Value]:
+    def world_radiance(self, world: bpy.types.World) -> tuple[list[Value], list[str]]:
         """Radiance of a world with nodes: a colour, or an image looked up by direction.
 
-        Where the camera sees another one, that is the second.
+        Where the camera sees another one, that is the second. With it, what is to be said if
+        nothing better is found.
         """
         owner = f"World '{world.name}'"
         output = world.node_tree.get_output_node("CYCLES")
         if output is None:
-            return [Constant.color((0.0, 0.0, 0.0))]
+            return [Constant.color((0.0, 0.0, 0.0))], []
         if is_linked(socket(output, "Volume")):
             self._log.warn(f"{owner}: volumes are not supported, the world is left empty")
-        values = []
+        values, simplified = [], []
         for camera in (False, True):
             evaluator = Evaluator(owner, self.textures, self._log, world=True, camera=camera)
             values.append(Radiance(evaluator).value(socket(output, "Surface")))
+            simplified += evaluator.simplified
             if not evaluator.tells_camera:
                 break
-        return values
+        return values, simplified
 
     def light_color(self, light: bpy.types.Light) -> tuple[float, float, float]:
         """What the nodes of a light multiply its power by."""

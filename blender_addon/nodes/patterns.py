@@ -98,7 +98,7 @@ def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stac
     if node.wave_type != "BANDS":
         raise UnsupportedError("waves in rings")
     if ev.value(node.inputs["Distortion"], stack) != Constant.number(0.0):
-        ev.warn(node, "distortion", "even waves are used")
+        ev.simplify(node, "distortion", "even waves are used")
     steps = _steady(_place(ev, node, stack), ev.number(node.inputs["Scale"], stack))
     phase = ev.number(node.inputs["Phase Offset"], stack)
     turns = np.array([*_BANDS[node.bands_direction], phase]) / (2.0 * np.pi)
@@ -115,7 +115,7 @@ def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, sta
     if not getattr(node, "normalize", True):
         raise UnsupportedError("noise that is not normalized")
     if output.identifier == "Color":
-        ev.warn(node, "coloured noise", "grey noise is used")
+        ev.simplify(node, "coloured noise", "grey noise is used")
     place = _place(ev, node, stack).scaled(ev.number(node.inputs["Scale"], stack))
     numbers = [
         ev.number(node.inputs[name], stack)

@@ -459,6 +459,19 @@ def case_media_are_as_bright_as_in_cycles() -> None:
         _check(found, mean=0.01, blocks=0.03, correlation=0.995)
 
 
+def case_skies_and_patterns_of_the_world() -> None:
+    """Nodes that only Cycles knows, as the picture that it makes of them."""
+    for kind in ("ShaderNodeTexSky", "ShaderNodeTexNoise"):
+        _stage("BsdfDiffuse", {"Color": (0.6, 0.5, 0.4, 1)})
+        _, tree, background = builders.world()
+        node = tree.nodes.new(kind)
+        tree.links.new(node.outputs["Color"], background.inputs["Color"])
+        background.inputs["Strength"].default_value = 0.1
+        found = agreement.compare(*agreement.render_both(64, 48, 256, 256))
+        print(kind)
+        _check(found, mean=0.003, blocks=0.01, correlation=0.9995)
+
+
 def case_insides_absorb() -> None:
     """Liquid in glass, a core in frosted glass, and a volume without a surface."""
     for kind, roughness in (("BsdfGlass", 0.0), ("BsdfGlass", 0.2), (None, 0.0)):

@@ -100,10 +100,29 @@ def case_environment_maps_point_where_blenders_do() -> None:
                 np.testing.assert_allclose(found, wanted, atol=1e-5, err_msg=f"{kind} {rotation}")
 
 
-def case_stretched_environment_is_named() -> None:
-    _environment((0, 0, 0), (1, 2, 1))
-    _, _, warnings = _dome()
+def case_stretched_environment() -> None:
+    """No dome can be stretched: Cycles makes a picture of it, if it has the image."""
+    pixels = _environment((0, 0, 0), (1, 2, 1))
+    dome, scene, warnings = _dome()
+    assert any("'Sky' has changes that are not saved" in text for text in warnings), warnings
     assert any("stretches" in text for text in warnings)
+    assert scene.images[dome["image"]]["pixels"].shape == pixels[..., :3].shape
+    bpy.data.images["Sky"].pack()
+    tree = bpy.context.scene.world.node_tree
+    image = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
+    image.interpolation = "Closest"
+    dome, scene, warnings = _dome()
+    assert not warnings, warnings
+    found = scene.images[dome["image"]]["pixels"]
+    assert found.shape == (1024, 2048, 3)
+    # Where the vector (x, 2 y, z) points to in the picture.
+    for x, y, z in ((1.0, 0.3, 0.2), (-1.0, 0.7, -0.4), (0.1, -0.6, 0.5)):
+        u, v = _blender_coordinates(np.array([x, y, z]) / np.linalg.norm([x, y, z]))
+        direction = np.array([x, 2.0 * y, z])
+        s, t = _blender_coordinates(direction / np.linalg.norm(direction))
+        wanted = pixels[::-1][int(t * 4), int(s * 8), :2]
+        got = found[::-1][int(v * 1024), int(u * 2048), :2]
+        np.testing.assert_allclose(got, wanted, atol=1e-4)
 
 
 def case_strength_of_an_image() -> None:
@@ -117,7 +136,7 @@ def case_strength_of_an_image() -> None:
     np.testing.assert_allclose(shown, 3.0 * pixels[..., :3], rtol=1e-3)
 
 
-def case_unsupported_worlds_are_named() -> None:
+def case_unsupported_worlds() -> None:
     _environment((0, 0, 0))
     tree = bpy.context.scene.world.node_tree
     node = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
@@ -127,6 +146,55 @@ def case_unsupported_worlds_are_named() -> None:
     # The average of the picture stands in.
     np.testing.assert_allclose(dome["radiance"], (3.5, 1.5, 1.0), rtol=1e-3)
     assert "image" not in dome
+    bpy.data.images["Sky"].pack()
+    dome, _, warnings = _dome()
+    assert "image" in dome and not warnings, warnings
+
+
+def case_skies_have_a_sun() -> None:
+    """A picture of the sky, once, and its sun as a light; anew when its nodes change."""
+    from blender_addon.export import panorama
+
+    _, tree, background = builders.world()
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_elevation, sky.sun_rotation, sky.sun_size = 0.6, 1.0, 0.02
+    background.inputs["Strength"].default_value = 0.1
+    tree.links.new(sky.outputs[0], background.inputs["Color"])
+    made = []
+    render = panorama._render
+
+    def counted(*arguments: object) -> panorama.Panorama:
+        made.append(arguments)
+        return render(*arguments)
+
+    panorama._render = counted
+    (_, dome), (_, sun) = _dome()[1].lights
+    assert dome["image"] is not None and sun["type"] == "distant"
+    np.testing.assert_allclose(sun["angle"], 0.02, rtol=1e-6)
+    towards = np.array(sun["transform"]).reshape(4, 4)[:3, 2]
+    wanted = np.array([np.sin(1.0) * np.cos(0.6), np.cos(1.0) * np.cos(0.6), np.sin(0.6)])
+    np.testing.assert_allclose(towards, wanted, atol=1e-3)
+    red, _, blue = sun["irradiance"]
+    assert red > blue > 0.0
+    assert len(_dome()[1].lights) == 2 and len(made) == 1
+    background.inputs["Strength"].default_value = 0.2
+    (_, _), (_, brighter) = _dome()[1].lights
+    np.testing.assert_allclose(brighter["irradiance"], 2.0 * np.array(sun["irradiance"]), rtol=0.01)
+    sky.sun_disc = False
+    assert len(_dome()[1].lights) == 1 and len(made) == 3
+
+
+def case_without_cycles_patterns_are_averaged() -> None:
+    from blender_addon.export import panorama
+
+    _, tree, background = builders.world()
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs["Color"], background.inputs["Color"])
+    panorama._PROCESS = panorama._PROCESS.with_name("missing.py")
+    dome, _, warnings = _dome()
+    assert "image" not in dome
+    assert any("Cycles could not make a picture" in text for text in warnings), warnings
+    assert any("'Noise Texture'" in text for text in warnings), warnings
 
 
 def case_camera_rays_may_see_another_background() -> None:
