@@ -156,7 +156,7 @@ def run(engine: SegueRenderEngine, depsgraph: bpy.types.Depsgraph, frame: Frame)
         )
 
     engine.update_stats(frame.layer, "Exporting the scene")
-    exporter = Exporter(segue, depsgraph, log, engine.stop_requested)
+    exporter = Exporter(segue, depsgraph, log, engine.stop_requested, is_preview=engine.is_preview)
     if not exporter.run():
         return
     scene = exporter.scene

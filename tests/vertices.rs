@@ -263,6 +263,29 @@ fn insides_that_absorb_agree() {
     }
 }
 
+/// A camera inside of the object, whose sight begins beyond its lens, and light from infinity on the back of a sheet, which
+/// nothing is left of.
+#[test]
+fn insides_that_absorb_agree_at_the_ends_of_paths() {
+    let wall = r#"{"surface":{"type":"translucent","color":0.8},"absorption":[0.5,1.5,4]}"#;
+    let mut s = yard(WALL, WALL);
+    let around = s.material(wall);
+    let (points, triangles) = icosphere(3);
+    let mesh = s.mesh(&points, &triangles, None);
+    s.place(mesh, around, DMat4::from_translation(DVec3::new(0.3, -2.2, 2.6)));
+    s.light(r#"{"type":"sphere","radius":0.1,"radiance":[9,9,9],"transform":[1,0,0,0.2,0,1,0,-1,0,0,1,1.4,0,0,0,1]}"#);
+    yard_camera(&mut s, 0.25, r#","near":0.7"#);
+    compare("camera inside", &s, SHARP, (24, 32), "");
+
+    let mut s = Stage::default();
+    let sheet = s.material(r#"{"surface":{"type":"diffuse","color":0.8},"absorption":[0.5,1.5,4]}"#);
+    s.quad([[-1., -1., 1.], [1., -1., 1.], [1., 1., 1.], [-1., 1., 1.]], sheet);
+    s.light(DOME);
+    s.light(r#"{"type":"sphere","radius":0.2,"radiance":[9,9,9],"transform":[1,0,0,0.3,0,1,0,0,0,0,1,0.2,0,0,0,1]}"#);
+    s.camera(DVec3::new(0.0, 0.0, -0.5), DVec3::new(0.0, 0.0, 1.0), 0.2, "");
+    compare("back of a sheet", &s, SHARP, (24, 32), "");
+}
+
 #[test]
 fn bounces_are_counted_as_in_path_tracing() {
     let mut s = corner(WALL, WALL, false);

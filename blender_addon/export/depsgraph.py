@@ -24,12 +24,15 @@ class Exporter:
         depsgraph: bpy.types.Depsgraph,
         log: ExportLog,
         stop: Callable[[], bool],
+        *,
+        is_preview: bool = False,
     ) -> None:
         self.scene = segue.Scene()
         self._segue = segue
         self._depsgraph = depsgraph
         self._log = log
         self._stop = stop
+        self._is_preview = is_preview
         self._translator = Translator(self.scene, log)
         # Mesh pointer -> id; None for a mesh without faces.
         self._meshes: dict[int, int | None] = {}
@@ -55,8 +58,15 @@ class Exporter:
                 return False
             self._add_group(group, materials, found)
         self._add_lights(found)
-        export_world(self.scene, self._depsgraph, self._translator, self._log)
-        return True
+        export_world(
+            self.scene,
+            self._depsgraph,
+            self._translator,
+            self._log,
+            self._stop,
+            is_preview=self._is_preview,
+        )
+        return not self._stop()
 
     def _add_group(self, group: Group, materials: list[int], found: Survey) -> None:
         """Add the instances of a group, and its mesh when it is met for the first time."""

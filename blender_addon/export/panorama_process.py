@@ -15,13 +15,14 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 _SIZE = (2048, 1024)
 _SAMPLES = 4
 # The sun is rendered alone, in a square that is this much wider than its disk.
 _SUN_SIZE, _SUN_SAMPLES, _SUN_MARGIN = 128, 16, 4.0
-# A larger one stays in the map.
+# As large it is looked for, so that samples meet it; a larger one than the second stays in the map.
+_LEAST_SUN = 0.02
 _LARGEST_SUN = 0.3
 # What a second sun may be of the first before both stay in the map.
 _REST = 0.01
@@ -36,9 +37,15 @@ class Studio:
         with bpy.data.libraries.load(file) as (_, wanted):
             wanted.worlds = [request["world"]]
         self.scene = bpy.context.scene
-        self.scene.world = wanted.worlds[0]
+        self.world = self.scene.world = wanted.worlds[0]
+        # The picture is made by rays from a camera, and of the surface alone.
+        self.world.cycles_visibility.camera = True
+        output = self.world.node_tree.get_output_node("CYCLES")
+        for link in list(output.inputs["Volume"].links):
+            self.world.node_tree.links.remove(link)
+        _answer_light_paths(self.world.node_tree, request["is_camera"])
+        self._place(request["objects"])
         self.scene.frame_set(request["frame"])
-        _answer_light_paths(self.scene.world.node_tree, request["is_camera"])
         render = self.scene.render
         render.engine = "CYCLES"
         render.resolution_percentage = 100
@@ -52,6 +59,16 @@ class Studio:
         self.camera = bpy.data.objects.new("Camera", data)
         self.scene.collection.objects.link(self.camera)
         self.scene.camera = self.camera
+
+    def _place(self, matrices: dict[str, list[list[float]]]) -> None:
+        """Replaces the objects that nodes ask where they are."""
+        for tree in (self.world.node_tree, *bpy.data.node_groups):
+            for node in tree.nodes:
+                if getattr(node, "object", None) is not None and node.object.name in matrices:
+                    stand_in = bpy.data.objects.new("Place", None)
+                    stand_in.matrix_world = Matrix(matrices[node.object.name])
+                    self.scene.collection.objects.link(stand_in)
+                    node.object = stand_in
 
     def _render(self, size: tuple[int, int], samples: int) -> np.ndarray:
         render = self.scene.render
@@ -91,9 +108,25 @@ class Studio:
 
     def discs(self) -> list[bpy.types.Node]:
         """Nodes that show a sun."""
-        trees = [self.scene.world.node_tree, *bpy.data.node_groups]
-        nodes = [node for tree in trees for node in tree.nodes]
-        return [n for n in nodes if n.bl_idname == "ShaderNodeTexSky" and n.sun_disc]
+        nodes = _used(self.world.node_tree.get_output_node("CYCLES"))
+        skies = [n for n in nodes if n.bl_idname == "ShaderNodeTexSky" and n.sun_disc]
+        return [n for n in skies if n.sky_type not in {"PREETHAM", "HOSEK_WILKIE"}]
+
+
+def _used(*ends: bpy.types.Node) -> list[bpy.types.Node]:
+    """The nodes whose values arrive at some, in groups as well."""
+    found: dict[int, bpy.types.Node] = {}
+    pending = list(ends)
+    while pending:
+        node = pending.pop()
+        if node.as_pointer() in found or node.mute:
+            continue
+        found[node.as_pointer()] = node
+        if getattr(node, "node_tree", None) is not None:
+            pending += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
+        links = (link for entry in node.inputs for link in entry.links)
+        pending += [link.from_node for link in links if link.is_valid and not link.is_muted]
+    return list(found.values())
 
 
 def _answer_light_paths(tree: bpy.types.NodeTree, is_camera: bool) -> None:
@@ -103,6 +136,8 @@ def _answer_light_paths(tree: bpy.types.NodeTree, is_camera: bool) -> None:
             (link.from_socket.name, link.to_socket)
             for link in owner.links
             if link.from_node.bl_idname == "ShaderNodeLightPath"
+            and link.is_valid
+            and not link.is_muted
         ]
         for name, entry in asked:
             value = owner.nodes.new("ShaderNodeValue")
@@ -122,20 +157,30 @@ def _directions() -> np.ndarray:
 
 def _take_out_sun(studio: Studio) -> tuple[np.ndarray, dict[str, Any] | None]:
     """The panorama without a sun, and that sun; or with it, and none."""
-    whole = studio.panorama()
     discs = studio.discs()
-    if not discs:
-        return whole, None
     for node in discs:
         node.sun_disc = False
     sky = studio.panorama()
+    if not discs:
+        return sky, None
+    sizes = [node.sun_size for node in discs]
+    for node, size in zip(discs, sizes, strict=True):
+        node.sun_disc, node.sun_size = True, max(size, _LEAST_SUN)
+    whole = studio.panorama()
+    for node, size in zip(discs, sizes, strict=True):
+        node.sun_size = size
     directions = _directions()
     added = (whole - sky).sum(-1) * np.hypot(directions[..., 0], directions[..., 1])
     peak = directions[np.unravel_index(added.argmax(), added.shape)]
-    angle = max(node.sun_size for node in discs)
-    elsewhere = np.abs(added[directions @ peak < math.cos(_SUN_MARGIN * angle)]).sum()
-    if angle > _LARGEST_SUN or added.max() <= 0.0 or elsewhere > _REST * added.sum():
-        return whole, None
+    if added.max() <= 0.0:
+        return sky, None
+    angle = max(sizes)
+    reach = _SUN_MARGIN * max(angle, _LEAST_SUN)
+    elsewhere = np.abs(added[directions @ peak < math.cos(reach)]).sum()
+    if angle > _LARGEST_SUN or elsewhere > _REST * added.sum():
+        return studio.panorama(), None
+    for node in discs:
+        node.sun_disc = False
     dark, directions, solid_angles = studio.view(Vector(peak), _SUN_MARGIN * angle)
     for node in discs:
         node.sun_disc = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -33,11 +34,15 @@ _RAY_FLAGS = {
 
 
 def world_json(
-    world: bpy.types.World | None, frame: int, translator: Translator, log: ExportLog
+    world: bpy.types.World | None,
+    translator: Translator,
+    log: ExportLog,
+    picture: Callable[[bpy.types.World, bool], Panorama | None],
 ) -> list[dict[str, Any]]:
     """The lights of a world: a dome, and a second where the camera sees another; none is black.
 
-    Skies with a sun have it as a light of its own.
+    Skies with a sun have it as a light of its own. `picture` makes one of a world, as the camera
+    sees it or as others do, or none.
     """
     if world is None:
         return []
@@ -47,7 +52,7 @@ def world_json(
     else:
         values, simplified = translator.world_radiance(world)
         if simplified or any(_is_stretched(value) for value in values):
-            made = [panorama(world, frame, k == len(values) - 1, log) for k in range(len(values))]
+            made = [picture(world, k == len(values) - 1) for k in range(len(values))]
             if None in made:
                 for text in simplified:
                     log.warn(text)
@@ -146,15 +151,25 @@ def _dome_transform(name: str, matrix: tuple[float, ...], log: ExportLog) -> lis
 
 
 def export_world(
-    scene: Any, depsgraph: bpy.types.Depsgraph, translator: Translator, log: ExportLog
+    scene: Any,
+    depsgraph: bpy.types.Depsgraph,
+    translator: Translator,
+    log: ExportLog,
+    stop: Callable[[], bool],
+    *,
+    is_preview: bool,
 ) -> None:
-    """Add the world of the view layer, if it shines."""
+    """Add the world of the view layer, if it shines. Previews do not wait for pictures of it."""
     view_layer = depsgraph.view_layer_eval
     if not view_layer.use_sky:
         return
     world = getattr(view_layer, "world_override", None) or depsgraph.scene_eval.world
     frame = depsgraph.scene_eval.frame_current
-    lights = world_json(world, frame, translator, log)
+
+    def picture(world: bpy.types.World, is_camera: bool) -> Panorama | None:
+        return None if is_preview else panorama(world, frame, is_camera, log, stop)
+
+    lights = world_json(world, translator, log, picture)
     for light in lights:
         scene.add_light(world.name, light)
     is_seen = any(light.get("camera_visible", True) for light in lights)

@@ -22,7 +22,7 @@ impl World {
         if !self.needs().absorption {
             return Vec3::ONE;
         }
-        let distance = (end.place.position - piece.ray.origin).length();
+        let distance = (end.place.position - piece.ray.origin).length() + piece.lead;
         self.left_between(piece.inside, interior(end, -piece.direction), distance)
     }
 

@@ -71,7 +71,8 @@ impl World {
             radiance: Vec3::ZERO,
         };
         let sound = flux.is_finite() && flux.max_element() > 0.0;
-        sound.then_some(LightRay { piece: Piece::along(ray, s.direction), flux, density, draw, hit })
+        let piece = Piece::along(ray, s.direction, self.emitters.is_infinite(id));
+        sound.then_some(LightRay { piece, flux, density, draw, hit })
     }
 
     /// Density of the light paths that leave towards where this light was met from.

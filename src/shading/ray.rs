@@ -19,6 +19,9 @@ pub struct Piece {
     pub(super) travelled: f32,
     /// The material of the surface that the piece leaves, if it does on its back.
     pub(super) inside: Option<u32>,
+    /// Distance that light passes on the piece before the ray's origin: endless from lights at infinity, less than none
+    /// where sight begins beyond it.
+    pub(super) lead: f32,
 }
 
 /// Light met along a ray.
@@ -82,17 +85,24 @@ impl Piece {
     /// The first piece of a camera ray.
     pub fn from_camera(c: &CameraRay) -> Self {
         let ray = Ray { origin: c.origin, direction: c.direction, t_min: c.range[0], t_max: c.range[1] };
-        Self { ray, direction: c.direction, travelled: 0.0, inside: None }
+        Self { ray, direction: c.direction, travelled: 0.0, inside: None, lead: -ray.t_min.max(0.0) }
     }
 
     /// The first piece of a ray that leaves an emitter.
-    pub(super) fn along(ray: Ray, direction: Vec3) -> Self {
-        Self { ray, direction, travelled: 0.0, inside: None }
+    pub(super) fn along(ray: Ray, direction: Vec3, is_from_infinity: bool) -> Self {
+        let lead = if is_from_infinity { f32::INFINITY } else { 0.0 };
+        Self { ray, direction, travelled: 0.0, inside: None, lead }
     }
 
     /// The first piece of a ray that leaves a surface.
     pub fn leaving(p: &SurfacePoint, direction: Vec3) -> Self {
-        Self { ray: p.place.spawn(direction), direction, travelled: 0.0, inside: interior(p, direction) }
+        Self {
+            ray: p.place.spawn(direction),
+            direction,
+            travelled: 0.0,
+            inside: interior(p, direction),
+            lead: 0.0,
+        }
     }
 
     /// The next piece, beyond a surface that was passed.
@@ -105,6 +115,7 @@ impl Piece {
             direction: self.direction,
             travelled: self.travelled + step,
             inside: interior(p, self.direction),
+            lead: 0.0,
         }
     }
 }

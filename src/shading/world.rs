@@ -348,7 +348,7 @@ impl World {
         if !self.needs.light_shapes {
             return;
         }
-        let Piece { ray, direction, travelled, inside } = *piece;
+        let Piece { ray, direction, travelled, inside, .. } = *piece;
         let t_max = end.map_or(ray.t_max, |p| (p.place.position - ray.origin).dot(direction));
         self.emitters.for_each_hit(ray.origin, direction, t_max, |hit| {
             if hit.distance >= ray.t_min && self.emitters.is_seen(hit.emitter, from_camera) {

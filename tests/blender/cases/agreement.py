@@ -473,7 +473,7 @@ def case_skies_and_patterns_of_the_world() -> None:
 
 
 def case_insides_absorb() -> None:
-    """Liquid in glass, a core in frosted glass, and a volume without a surface."""
+    """A core in smooth and in frosted glass, and in a volume without a surface."""
     for kind, roughness in (("BsdfGlass", 0.0), ("BsdfGlass", 0.2), (None, 0.0)):
         _stage("BsdfDiffuse", {"Color": (0.6, 0.5, 0.4, 1)})
         if kind:

@@ -157,7 +157,8 @@ def case_skies_have_a_sun() -> None:
 
     _, tree, background = builders.world()
     sky = tree.nodes.new("ShaderNodeTexSky")
-    sky.sun_elevation, sky.sun_rotation, sky.sun_size = 0.6, 1.0, 0.02
+    # So small that hardly a sample of the whole sky would meet it.
+    sky.sun_elevation, sky.sun_rotation, sky.sun_size = 0.6, 1.0, 0.001
     background.inputs["Strength"].default_value = 0.1
     tree.links.new(sky.outputs[0], background.inputs["Color"])
     made = []
@@ -170,7 +171,7 @@ def case_skies_have_a_sun() -> None:
     panorama._render = counted
     (_, dome), (_, sun) = _dome()[1].lights
     assert dome["image"] is not None and sun["type"] == "distant"
-    np.testing.assert_allclose(sun["angle"], 0.02, rtol=1e-6)
+    np.testing.assert_allclose(sun["angle"], 0.001, rtol=1e-6)
     towards = np.array(sun["transform"]).reshape(4, 4)[:3, 2]
     wanted = np.array([np.sin(1.0) * np.cos(0.6), np.cos(1.0) * np.cos(0.6), np.sin(0.6)])
     np.testing.assert_allclose(towards, wanted, atol=1e-3)
@@ -180,8 +181,14 @@ def case_skies_have_a_sun() -> None:
     background.inputs["Strength"].default_value = 0.2
     (_, _), (_, brighter) = _dome()[1].lights
     np.testing.assert_allclose(brighter["irradiance"], 2.0 * np.array(sun["irradiance"]), rtol=0.01)
+    # The whole sun shines as much, however large it is; nor does it matter who sees it.
+    sky.sun_size = 0.02
+    bpy.context.scene.world.cycles_visibility.camera = False
+    (_, dome), (_, larger) = _dome()[1].lights
+    np.testing.assert_allclose(larger["irradiance"], brighter["irradiance"], rtol=0.02)
+    assert not larger["camera_visible"] and not dome["camera_visible"]
     sky.sun_disc = False
-    assert len(_dome()[1].lights) == 1 and len(made) == 3
+    assert len(_dome()[1].lights) == 1 and len(made) == 4
 
 
 def case_without_cycles_patterns_are_averaged() -> None:
