@@ -192,6 +192,26 @@ def case_skies_have_a_sun() -> None:
     assert len(_dome()[1].lights) == 1 and len(made) == 4
 
 
+def case_objects_turn_a_world() -> None:
+    """Coordinates of an object: its place is that of the frame, and the picture is made anew."""
+    _environment((0, 0, 0))
+    bpy.data.images["Sky"].pack()
+    nodes = bpy.context.scene.world.node_tree.nodes
+    place = next(n for n in nodes if n.bl_idname == "ShaderNodeTexCoord")
+    mapping = next(n for n in nodes if n.bl_idname == "ShaderNodeMapping")
+    place.object = builders.link(None, "Compass")
+    place.id_data.links.new(place.outputs["Object"], mapping.inputs["Vector"])
+    shown = []
+    for turn in (0.0, 0.5 * np.pi):
+        place.object.rotation_euler.z = turn
+        dome, scene, warnings = _dome()
+        assert not warnings, warnings
+        shown.append(scene.images[dome["image"]]["pixels"])
+    # A quarter to the left, where +Y is; pixels at the edges of texels have samples of both.
+    np.testing.assert_allclose(np.roll(shown[0], -512, axis=1), shown[1], atol=0.1)
+    assert shown[0].std() > 0.5
+
+
 def case_without_cycles_patterns_are_averaged() -> None:
     from blender_addon.export import panorama
 
