@@ -122,7 +122,7 @@ def _run(arguments: list[str], log: Path, stop: Callable[[], bool]) -> None:
         while process.poll() is None:
             if stop() or time.monotonic() > until:
                 process.kill()
-                raise ValueError("it was stopped")
+                raise ValueError(f"it did not end within {_PATIENCE:g} seconds")
             time.sleep(_PAUSE)
     if process.returncode:
         lines = log.read_text(errors="replace").strip().splitlines()

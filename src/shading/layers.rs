@@ -1,8 +1,8 @@
 //! All surfaces on a short way through space.
 
 use super::class::SurfaceClass;
-use super::surface::{normal_matrix, normalize_any, shading_normal};
-use super::texture::{MeshPoint, interpolate};
+use super::surface::{normalize_any, shading_normal};
+use super::texture::MeshPoint;
 use super::world::World;
 use crate::accel::{Hit, Ray};
 use glam::{Mat3, Vec2, Vec3};
@@ -52,12 +52,11 @@ impl World {
         let outside = (matrix * (b - a)).cross(matrix * (c - a)) * 1f32.copysign(matrix.determinant());
         let normal = normalize_any(outside);
         let at = MeshPoint { mesh: index, triangle: hit.triangle, barycentrics: Vec2::new(hit.u, hit.v) };
-        let own = |normals| shading_normal(normal_matrix(matrix) * interpolate(normals, mesh, &at), normal);
         Layer {
             depth: hit.t,
             position,
             normal,
-            ns: mesh.normals.as_ref().map_or(normal, own),
+            ns: shading_normal(&self.scene, hit.instance, &at, normal),
             class: self.class(self.scene.material_index(hit.instance, hit.triangle)),
         }
     }

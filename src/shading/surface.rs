@@ -57,9 +57,12 @@ pub fn normalize_any(v: Vec3) -> Vec3 {
     if scale > 0.0 && scale.is_finite() { (v / scale).normalize() } else { Vec3::ZERO }
 }
 
-/// The unit normal that a mesh's own one of any length makes, on the side of the geometric one.
-pub fn shading_normal(own: Vec3, geometric: Vec3) -> Vec3 {
-    let n = normalize_any(own);
+/// Unit shading normal at a point of an instance's mesh, on the side of the geometric one.
+pub fn shading_normal(scene: &Scene, instance: u32, at: &MeshPoint, geometric: Vec3) -> Vec3 {
+    let mesh = &scene.meshes[at.mesh as usize];
+    let Some(normals) = &mesh.normals else { return geometric };
+    let matrix = Mat3::from(scene.instances[instance as usize].to_world.matrix3);
+    let n = normalize_any(normal_matrix(matrix) * interpolate(normals, mesh, at));
     // no normal there (zero, not finite): the geometric one
     if n.length_squared() > 0.5 { n * 1f32.copysign(n.dot(geometric)) } else { geometric }
 }
@@ -73,20 +76,12 @@ impl SurfacePoint {
     /// The surface where a ray hit.
     pub fn new(scene: &Scene, accel: &Accel, hit: &Hit) -> Self {
         let group = scene.group(hit.instance);
-        let mesh = &*scene.meshes[group.mesh as usize];
         let at =
             MeshPoint { mesh: group.mesh, triangle: hit.triangle, barycentrics: Vec2::new(hit.u, hit.v) };
         let place = place(scene, accel, hit.instance, &at);
-        let ns = match &mesh.normals {
-            None => place.normal,
-            Some(n) => {
-                let matrix = Mat3::from(scene.instances[hit.instance as usize].to_world.matrix3);
-                shading_normal(normal_matrix(matrix) * interpolate(n, mesh, &at), place.normal)
-            }
-        };
         Self {
             place,
-            ns,
+            ns: shading_normal(scene, hit.instance, &at, place.normal),
             instance: hit.instance,
             material: scene.material_index(hit.instance, hit.triangle),
             at,
