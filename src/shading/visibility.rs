@@ -64,7 +64,7 @@ impl World {
             let rest = ray_from(&p.place);
             // a plane that both ends lie on, to rounding, is met without end
             if rest.t_max.is_finite() && length_squared(&rest) >= length_squared(&ray) {
-                return weight;
+                break;
             }
             let piece = Ray { t_max: hit.t, ..ray };
             weight *= left(&piece, inside, interior(&p, -ray.direction));
