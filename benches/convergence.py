@@ -1,10 +1,10 @@
 """The reports of docs/convergence: error against run time of the method, its parts and its rivals; and their last figures
 as a section of docs/method.md.
 
-The scenes come from those that are shared between renderers (SEGUE_SHARED, or ../shared beside the checkout); without
-them it says so and does nothing. Four have references by other renderers, at twice the resolution. Those of the two
-interiors are means of independent renders by `segment` with a small fixed kernel, which blurs half a
-pixel; how far two halves of them are apart is printed. Run:
+Three scenes are of the gallery. The others come from those that are shared between renderers (SEGUE_SHARED, or ../shared
+beside the checkout); those that are missing are named and left out. Four have references by other renderers, at twice the
+resolution. Those of the gallery and of the two interiors are means of independent renders by `segment` with a small fixed
+kernel, which blurs half a pixel; how far two halves of them are apart is printed. Run:
 .venv/bin/python benches/convergence.py [SCENE ...]
 """
 
@@ -26,20 +26,24 @@ ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared"))
 REPORTS = ROOT / "docs" / "convergence"
 METHODS = "segment,segment-progressive,segment-fixed,mvf,photon-filter,bpm,vcm,path"
-#: Names in the shared scenes, resolutions, and seconds of one thread for a reference.
-INTERIORS = {
-    "bathroom": ("bathroom", (180, 120), 900.0),
-    "kitchen": ("kitchen-ppg", (180, 120), 2400.0),
+#: Stages whose references are made here, resolutions, and seconds of one thread for a reference.
+OWN = {
+    "glass_caustic": (ROOT / "scenes/glass_caustic.usda", (192, 108), 900.0),
+    "door_ajar": (ROOT / "scenes/door_ajar.usda", (192, 108), 900.0),
+    "glossy_room": (ROOT / "scenes/glossy_room.usda", (192, 108), 900.0),
+    "bathroom": (SHARED / "scenes/bathroom/bathroom.usdc", (180, 120), 900.0),
+    "kitchen": (SHARED / "scenes/kitchen-ppg/kitchen-ppg.usdc", (180, 120), 2400.0),
 }
+#: Those that have references by other renderers.
 OTHERS = ("cornell_glass", "lamp", "ajar_door", "glossy_box")
-#: References of the interiors are kept here and taken up again; delete them to make them anew.
+#: References that are made here are kept in this folder and taken up again; delete them to make them anew.
 KEPT = ROOT / "build" / "references"
 #: Seconds of one thread for each method.
 SECONDS = 30.0
 KERNEL = 0.5
 HEADING = "Error against run time"
 HEAD = f"""MAPE in percent and, in brackets, relMSE of eight methods after {SECONDS:g} seconds of one thread, the lowest MAPE first, by `benches/convergence.py`; the whole curves are in
-`docs/convergence`. References are by other renderers, at 128 × 128, or those of the interiors (180 × 120) by `segment` with a fixed kernel of {KERNEL:g} pixels. `progressive` and `fixed` are `segment` with those
+`docs/convergence`. References are by other renderers, at 128 × 128, or, of three scenes of the gallery (192 × 108) and the two interiors (180 × 120), by `segment` with a fixed kernel of {KERNEL:g} pixels. `progressive` and `fixed` are `segment` with those
 kernels; that of `segment`, of `mvf` and of `photon-filter` is adaptive.
 
 | scene |{" |" * len(METHODS.split(","))}
@@ -109,16 +113,15 @@ def row(report: Path) -> str:
 def main(names: list[str]) -> int:
     """Makes the reports of these scenes, or of all."""
     REPORTS.mkdir(parents=True, exist_ok=True)
-    for name in names or [*INTERIORS, *OTHERS]:
+    for name in names or [*OWN, *OTHERS]:
         stage = SHARED / "peers" / "usd" / f"{name}.usda"
-        if name in INTERIORS:
-            folder, resolution, seconds = INTERIORS[name]
-            stage = SHARED / "scenes" / folder / f"{folder}.usdc"
+        if name in OWN:
+            stage, resolution, seconds = OWN[name]
         if not stage.exists():
             print(f"skipped: {stage} does not exist", flush=True)
             continue
         with tempfile.TemporaryDirectory() as scratch:
-            if name in INTERIORS:
+            if name in OWN:
                 made = KEPT / f"{name}.exr"
                 made.parent.mkdir(parents=True, exist_ok=True)
                 if not made.exists():

@@ -76,7 +76,8 @@ impl SceneBuilder {
     /// Adds a texture from its JSON description; its index.
     pub fn add_texture(&mut self, name: &str, json: &str) -> Result<u32, SceneError> {
         let id = next_id(self.textures.len(), "textures")?;
-        self.textures.push(Texture::from_json(name, json, self.images.len())?);
+        let texture = Texture::from_json(name, json, &self.images, &self.textures)?;
+        self.textures.push(texture);
         Ok(id)
     }
 

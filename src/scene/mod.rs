@@ -3,6 +3,7 @@
 
 pub mod builder;
 pub mod camera;
+pub mod composition;
 pub mod error;
 pub mod image;
 pub mod instance;

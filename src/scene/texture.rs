@@ -1,9 +1,11 @@
 //! Textures: where a material's values come from when they are not constant.
 
-use super::SceneError;
+use super::composition::{Multilinear, MultilinearJson, Table, TableJson};
+use super::{Image, SceneError};
 use crate::math::noise::Fractal;
 use glam::{Affine2, Mat2, Vec2, Vec4};
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// What lies outside `[0,1]` of an image's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
@@ -81,6 +83,10 @@ pub enum Texture {
         /// Value where the mesh has no such attribute.
         default: Vec4,
     },
+    /// A sum of products of others.
+    Multilinear(Multilinear),
+    /// A function of others.
+    Table(Table),
 }
 
 #[derive(Deserialize)]
@@ -126,6 +132,8 @@ enum Json {
         name: String,
         default: [f32; 4],
     },
+    Multilinear(MultilinearJson),
+    Table(TableJson),
 }
 
 /// Octaves beyond the first, at most.
@@ -148,14 +156,19 @@ fn ones() -> [f32; 4] {
 }
 
 impl Texture {
-    /// A texture from its JSON description (`docs/abi.md`); `image_count` images exist.
-    pub fn from_json(name: &str, json: &str, image_count: usize) -> Result<Self, SceneError> {
+    /// A texture from its JSON description (`docs/abi.md`), and from the images and other textures that are there.
+    pub fn from_json(
+        name: &str,
+        json: &str,
+        images: &[Arc<Image>],
+        before: &[Self],
+    ) -> Result<Self, SceneError> {
         let fail = |problem: String| SceneError::new(format!("texture {name:?}"), problem);
         let finite = |what: &str, values: &[f32]| match values.iter().all(|v| v.is_finite()) {
             true => Ok(()),
             false => Err(fail(format!("{what} has a value that is not finite"))),
         };
-        let exists = |image: u32| match (image as usize) < image_count {
+        let exists = |image: u32| match (image as usize) < images.len() {
             true => Ok(()),
             false => Err(fail(format!("there is no image {image}"))),
         };
@@ -201,6 +214,8 @@ impl Texture {
                 finite("default", &default)?;
                 Ok(Self::Attribute { name: attribute, default: default.into() })
             }
+            Json::Multilinear(json) => Ok(Self::Multilinear(Multilinear::new(json, name, before)?)),
+            Json::Table(json) => Ok(Self::Table(Table::new(json, name, images, before)?)),
         }
     }
 }
@@ -208,11 +223,21 @@ impl Texture {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Warnings;
+    use crate::scene::image::{Encoding, Pixels};
 
     #[test]
     fn descriptions_are_read_and_checked() {
-        let t = Texture::from_json("t", r#"{"type":"image","image":0,"transform":[2,0,0.5,0,3,0.25]}"#, 1)
-            .unwrap();
+        let black =
+            Image::new("i", (1, 1, 1), Pixels::U8(vec![0]), Encoding::Linear, &mut Warnings::default());
+        let images = [Arc::new(black.unwrap())];
+        let t = Texture::from_json(
+            "t",
+            r#"{"type":"image","image":0,"transform":[2,0,0.5,0,3,0.25]}"#,
+            &images,
+            &[],
+        )
+        .unwrap();
         let Texture::Image(t) = t else { panic!("not an image") };
         assert_eq!(t.transform.transform_point2(Vec2::ONE), Vec2::new(2.5, 3.25));
         for (json, what) in [
@@ -225,7 +250,7 @@ mod tests {
             (r#"{"type":"noise","place":"p","image":0,"detail":1e39}"#, "noise"),
             (r#"{"type":"constant","value":[1,2,3]}"#, "length"),
         ] {
-            let e = Texture::from_json("t", json, 1).unwrap_err().to_string();
+            let e = Texture::from_json("t", json, &images, &[]).unwrap_err().to_string();
             assert!(e.contains(what), "{json}: {e}");
         }
     }

@@ -5,6 +5,7 @@ pub mod emitters;
 pub mod lobes;
 
 mod class;
+mod composition;
 mod emissive;
 mod first_hit;
 mod interior;

@@ -30,7 +30,7 @@ impl MeshPoint {
 /// All textures of a scene, with the names of attributes resolved to numbers.
 #[derive(Debug)]
 pub struct TextureSet {
-    scene: Arc<Scene>,
+    pub(super) scene: Arc<Scene>,
     /// For each texture, the number of its attribute's name.
     texture_names: Vec<u32>,
     /// For each mesh, name numbers of its UV sets and of its colours.
@@ -51,7 +51,7 @@ impl TextureSet {
             .textures
             .iter()
             .filter_map(|t| match t {
-                Texture::Constant(_) => None,
+                Texture::Constant(_) | Texture::Multilinear(_) | Texture::Table(_) => None,
                 Texture::Image(t) => Some(t.uv.as_str()),
                 Texture::Noise(t) => Some(t.place.as_str()),
                 Texture::Attribute { name, .. } => Some(name.as_str()),
@@ -66,7 +66,7 @@ impl TextureSet {
             .textures
             .iter()
             .map(|t| match t {
-                Texture::Constant(_) => FIRST,
+                Texture::Constant(_) | Texture::Multilinear(_) | Texture::Table(_) => FIRST,
                 Texture::Image(t) => number(&t.uv),
                 Texture::Noise(t) => number(&t.place),
                 Texture::Attribute { name, .. } => number(name),
@@ -89,6 +89,8 @@ impl TextureSet {
             }
             Texture::Noise(t) => self.noise(t, self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate()),
             Texture::Attribute { default, .. } => self.attribute(texture, at).unwrap_or(*default),
+            Texture::Multilinear(t) => self.multilinear(t, at).extend(1.0),
+            Texture::Table(t) => self.table(t, at).extend(1.0),
         }
     }
 
@@ -126,26 +128,36 @@ impl TextureSet {
     /// How much a number changes along the edges of the triangle that leave its first vertex, over the whole of each: in an image as
     /// from one texel to the next.
     pub fn slopes(&self, value: &Value, at: &MeshPoint) -> Vec2 {
-        let Value::Texture { texture, channel } = *value else { return Vec2::ZERO };
-        let read = |v: Vec4| grey(part(channel, v));
+        let [u, v] = self.color_slopes(value, at);
+        Vec2::new(luminance(u), luminance(v))
+    }
+
+    /// The same of a colour.
+    pub(super) fn color_slopes(&self, value: &Value, at: &MeshPoint) -> [Vec3; 2] {
+        let Value::Texture { texture, channel } = *value else { return [Vec3::ZERO; 2] };
         let mesh = &self.scene.meshes[at.mesh as usize];
         let vertices = mesh.triangles[at.triangle as usize];
-        match &self.scene.textures[texture as usize] {
-            Texture::Constant(_) => Vec2::ZERO,
+        let slopes = match &self.scene.textures[texture as usize] {
+            Texture::Constant(_) => [Vec4::ZERO; 2],
             Texture::Image(t) => {
                 let names = (&self.uv_names[at.mesh as usize], self.texture_names[texture as usize]);
-                let Some(set) = index(names.0, names.1) else { return Vec2::ZERO };
+                let Some(set) = index(names.0, names.1) else { return [Vec3::ZERO; 2] };
                 let Ok([a, b, c]) = mesh.uvs[set].1.corners(at.triangle as usize, vertices) else {
-                    return Vec2::ZERO;
+                    return [Vec3::ZERO; 2];
                 };
                 let image = &self.scene.images[t.image as usize];
                 let size = Vec2::new(image.width() as f32, image.height() as f32);
                 let st = t.transform.transform_point2(interpolate(&mesh.uvs[set].1, mesh, at));
-                let at = |st: Vec2| read(sample(image, t, st) * t.scale + t.bias);
-                let across = |texel: Vec2| at(st + 0.5 * texel / size) - at(st - 0.5 * texel / size);
-                let gradient = Vec2::new(across(Vec2::X), across(Vec2::Y)) * size;
-                let along = |edge: Vec2| gradient.dot(t.transform.transform_vector2(edge));
-                Vec2::new(along(b - a), along(c - a))
+                let across = |texel: Vec2| {
+                    let d = 0.5 * texel / size;
+                    (sample(image, t, st + d) - sample(image, t, st - d)) * t.scale
+                };
+                let (ds, dt) = (across(Vec2::X) * size.x, across(Vec2::Y) * size.y);
+                let along = |edge: Vec2| {
+                    let edge = t.transform.transform_vector2(edge);
+                    ds * edge.x + dt * edge.y
+                };
+                [along(b - a), along(c - a)]
             }
             Texture::Noise(t) => {
                 let place = self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate();
@@ -155,17 +167,20 @@ impl TextureSet {
                     let length = edge.length();
                     let step = 0.5 * FINE * t.noise.finest();
                     let d = edge * (step / length);
-                    let rise = read(self.noise(t, place + d)) - read(self.noise(t, place - d));
-                    if length > 0.0 { rise * (length / (2.0 * step)) } else { 0.0 }
+                    let rise = self.noise(t, place + d) - self.noise(t, place - d);
+                    if length > 0.0 { rise * (length / (2.0 * step)) } else { Vec4::ZERO }
                 };
-                Vec2::new(along(corner(1.0, 0.0) - first), along(corner(0.0, 1.0) - first))
+                [along(corner(1.0, 0.0) - first), along(corner(0.0, 1.0) - first)]
             }
             Texture::Attribute { .. } => {
                 let corner = |u, v| self.lookup(texture, &at.moved(u, v));
-                let [a, b, c] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)].map(read);
-                Vec2::new(b - a, c - a)
+                let [a, b, c] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)];
+                [b - a, c - a]
             }
-        }
+            Texture::Multilinear(t) => self.multilinear_slopes(t, at).map(|s| s.extend(0.0)),
+            Texture::Table(t) => self.table_slopes(t, at).map(|s| s.extend(0.0)),
+        };
+        slopes.map(|s| part(channel, s))
     }
 
     /// Index in the mesh's list of the UV set that `name` (of a normal map) means.
