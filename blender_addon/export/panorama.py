@@ -37,9 +37,9 @@ class Panorama:
         """See `ImageSource`."""
         return np.maximum(self.pixels, 0.0)
 
-    def least(self) -> float:
+    def reach(self) -> tuple[float, float]:
         """See `ImageSource`."""
-        return float(self.pixels.min())
+        return float(self.pixels.min()), float(self.pixels.max())
 
 
 #: The last ones, or why there are none, by what they were made of: frames and edits of anything

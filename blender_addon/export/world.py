@@ -11,7 +11,7 @@ from mathutils import Vector
 
 from ..log import ExportLog
 from ..nodes.material import Translator
-from ..nodes.values import AttributeValue, Constant, ImageValue, Sampling, Value, negative
+from ..nodes.values import Constant, ImageValue, Sampling, Value, bounds
 from .lights import ALL_BOUNCES
 from .panorama import Panorama, panorama
 
@@ -91,7 +91,7 @@ def _dome(
 ) -> dict[str, Any] | None:
     """A dome of this radiance."""
     name = f"World '{world.name}'"
-    if negative(value):
+    if bounds(value)[0] < 0.0:
         log.warn(f"{name}: negative light is not supported, that part is left out")
     result: dict[str, Any] = {"type": "dome"}
     if isinstance(value, ImageValue):
@@ -102,7 +102,7 @@ def _dome(
         result["image"] = translator.textures.image(value.source)
         result["transform"] = _dome_transform(world.name, value.sampling.matrix, log)
         return result
-    assert not isinstance(value, AttributeValue)
+    assert isinstance(value, Constant)
     radiance = [max(channel, 0.0) for channel in value.rgb]
     if not any(radiance):
         return None

@@ -10,7 +10,7 @@ import bpy
 from .evaluate import Evaluator
 from .fresnel import fresnel_ior, layered
 from .tree import Stack, is_linked, resolve, socket
-from .values import KINDS, Constant, ImageValue, Value, convert, negative
+from .values import KINDS, AttributeValue, Constant, Value, bounds, convert
 
 Closure = dict[str, Any]
 
@@ -124,10 +124,14 @@ _NEAREST: dict[str, tuple[str, str]] = {
 
 
 class ClosureTranslator:
-    """Translates the closures of one node tree, each once however often it is used."""
+    """Translates the closures of one node tree, each once however often it is used.
 
-    def __init__(self, evaluator: Evaluator) -> None:
+    `raised`: the bump map under all that have no normal of their own.
+    """
+
+    def __init__(self, evaluator: Evaluator, raised: dict[str, Any] | None) -> None:
         self.ev = evaluator
+        self.raised = raised
         self._memo: dict[tuple, Closure] = {}
         # Number of shaders in each closure, by identity.
         self._sizes: dict[int, int] = {}
@@ -261,7 +265,9 @@ class ClosureTranslator:
         if isinstance(color, Constant) and isinstance(strength, Constant):
             below = any(channel * strength.rgb[0] < 0.0 for channel in color.rgb)
         else:
-            below = strength != Constant.number(0.0) and (negative(color) or negative(strength))
+            below = (
+                strength != Constant.number(0.0) and min(*bounds(color), *bounds(strength)) < 0.0
+            )
         if below:
             self.ev.warn(node, "negative emission", "that part is left out")
 
@@ -286,15 +292,15 @@ class ClosureTranslator:
         """The normal or bump map at a Normal input; None for the surface's own normal."""
         source = resolve(entry, stack) if entry is not None else None
         if source is None or source.node is None:
-            return None
+            return self.raised
         node = source.node
         if node.bl_idname == "ShaderNodeBump":
             return self._bump_map(node, source.stack)
         if node.bl_idname == "ShaderNodeNewGeometry" and source.output.identifier == "Normal":
-            return None
+            return self.raised
         if node.bl_idname != "ShaderNodeNormalMap":
             self.ev.warn(node, "a computed normal", "the surface's own is used")
-            return None
+            return self.raised
         return self._normal_map(node, source.stack)
 
     def _bump_map(self, node: bpy.types.Node, stack: Stack) -> dict[str, Any] | None:
@@ -316,7 +322,7 @@ class ClosureTranslator:
         value = self.ev.value(node.inputs["Color"], stack)
         if isinstance(value, Constant):
             return None
-        if space is None or not isinstance(value, ImageValue) or value.channel != "rgb":
+        if space is None or isinstance(value, AttributeValue) or value.channel != "rgb":
             self.ev.warn(node, "a normal map of this kind", "the surface's own normal is used")
             return None
         # DirectX's green points down; the choice is new in Blender 5.1.

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ..log import ExportLog
+from .composition import compose
 from .textures import TextureStore
 from .tree import Source, Stack, resolve, socket
 from .value_nodes import VALUE_NODES
@@ -105,12 +106,19 @@ class Evaluator:
     def combine(
         self, node: bpy.types.Node, kind: Kind, function: Callable[..., np.ndarray], *values: Value
     ) -> Value:
-        """Apply `function` to values, or to their averages where they cannot be combined."""
+        """Apply `function` to values, or to their averages where that cannot be expressed."""
         try:
             return combine(node.name, kind, function, *values)
         except UnsupportedError as reason:
-            self.simplify(node, str(reason), "averages are used")
-            return combine(node.name, kind, function, *(average(value) for value in values))
+            problem = reason
+        if not self.world:
+            # what surrounds a scene is one picture
+            try:
+                return compose(node.name, kind, function, *values)
+            except UnsupportedError as reason:
+                problem = reason
+        self.simplify(node, str(problem), "averages are used")
+        return combine(node.name, kind, function, *(average(value) for value in values))
 
     def number(self, entry: bpy.types.NodeSocket, stack: Stack) -> float:
         """An input that must be a plain number: an image is replaced by its mean."""

@@ -8,6 +8,7 @@ import bpy
 
 from ..log import ExportLog
 from .closures import BLACK, Closure, ClosureTranslator
+from .displacement import raised
 from .evaluate import Evaluator
 from .interior import absorption
 from .radiance import Radiance
@@ -57,7 +58,10 @@ class Translator:
             return result
         owner = f"Material '{material.name}'"
         evaluator = Evaluator(owner, self.textures, self._log)
-        result["surface"] = self._surface(evaluator, output)
+        # Blender 4.1 moved this from Cycles' settings.
+        cycles = getattr(material, "cycles", None)
+        method = getattr(material, "displacement_method", None) or cycles.displacement_method
+        result["surface"] = self._surface(evaluator, output, method)
         inside = absorption(evaluator, socket(output, "Volume"))
         if inside.any():
             result["absorption"] = inside.tolist()
@@ -70,15 +74,11 @@ class Translator:
             )
         return result
 
-    def _surface(self, evaluator: Evaluator, output: bpy.types.Node) -> dict[str, Any]:
+    def _surface(self, evaluator: Evaluator, output: bpy.types.Node, method: str) -> dict[str, Any]:
         surface = socket(output, "Surface")
-        if is_linked(socket(output, "Displacement")):
-            self._log.warn(
-                f"{evaluator.owner}: displacement is not supported, the surface is left as it is"
-            )
         if is_linked(socket(output, "Volume")) and not is_linked(surface):
             return {"type": "transparent", "color": [1.0, 1.0, 1.0]}
-        return ClosureTranslator(evaluator).closure(surface)
+        return ClosureTranslator(evaluator, raised(evaluator, output, method)).closure(surface)
 
     def world_radiance(self, world: bpy.types.World) -> tuple[list[Value], list[str]]:
         """Radiance of a world with nodes: a colour, or an image looked up by direction.

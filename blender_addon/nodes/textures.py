@@ -15,6 +15,8 @@ from ..log import ExportLog
 from .coordinates import Coordinates
 from .values import (
     AttributeValue,
+    Baked,
+    Composed,
     Constant,
     ImageSource,
     ImageValue,
@@ -50,9 +52,11 @@ class BlenderSource:
         """See `ImageSource`."""
         return self.pixels().linear()
 
-    def least(self) -> float:
+    def reach(self) -> tuple[float, float]:
         """See `ImageSource`."""
-        return float(self.pixels().values.min())
+        values = self.pixels().values
+        most = 255.0 if values.dtype == np.uint8 else 1.0
+        return float(values.min()) / most, float(values.max()) / most
 
 
 class TextureStore:
@@ -124,43 +128,58 @@ class TextureStore:
 
     def texture(
         self,
-        value: ImageValue | AttributeValue,
+        value: ImageValue | AttributeValue | Composed,
         scale: Sequence[float] = (1.0, 1.0, 1.0),
         bias: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> int:
         """Id of the texture that yields `scale * value + bias`; an attribute is never scaled."""
+        name = value.name if not isinstance(value, ImageValue) else value.source.name
         if isinstance(value, AttributeValue):
             name = self._reading(value)
-            data: dict[str, Any] = {
-                "type": "attribute",
-                "name": name,
-                "default": [*value.matrix[:, 3].tolist(), 1.0],
-            }
+            default = [*value.matrix[:, 3].tolist(), 1.0]
+            data: dict[str, Any] = {"type": "attribute", "name": name, "default": default}
+        elif isinstance(value, Composed):
+            data = self._composed(value, np.array(scale), np.array(bias))
         else:
-            sampling = value.sampling
-            scale = [factor * value.gain for factor in scale]
-            name = value.source.name
-            data = {"image": self.image(value.source)}
-            if sampling.space == "noise":
-                numbers = zip(NOISE, sampling.matrix, strict=True)
-                data |= {"type": "noise", "place": sampling.uv, **dict(numbers)}
-            else:
-                if sampling.uv:
-                    self.uvs.add(sampling.uv)
-                data |= {
-                    "type": "image",
-                    "uv": sampling.uv,
-                    "transform": list(sampling.matrix),
-                    "wrap_s": sampling.wrap,
-                    "wrap_t": sampling.wrap,
-                    "filter": sampling.filter,
-                }
-            data["scale"] = [*scale, 1.0]
+            data = self._picture(value)
+            data["scale"] = [*(factor * value.gain for factor in scale), 1.0]
             data["bias"] = [*bias, 0.0]
         key = json.dumps(data, sort_keys=True)
         if key not in self._textures:
             self._textures[key] = self._scene.add_texture(name, data)
         return self._textures[key]
+
+    def _picture(self, value: ImageValue) -> dict[str, Any]:
+        """A picture that is looked up by coordinates or by noise, as it is."""
+        sampling = value.sampling
+        data: dict[str, Any] = {"image": self.image(value.source)}
+        if sampling.space == "noise":
+            numbers = zip(NOISE, sampling.matrix, strict=True)
+            return data | {"type": "noise", "place": sampling.uv, **dict(numbers)}
+        if sampling.uv:
+            self.uvs.add(sampling.uv)
+        return data | {
+            "type": "image",
+            "uv": sampling.uv,
+            "transform": list(sampling.matrix),
+            "wrap_s": sampling.wrap,
+            "wrap_t": sampling.wrap,
+            "filter": sampling.filter,
+        }
+
+    def _composed(self, value: Composed, scale: np.ndarray, bias: np.ndarray) -> dict[str, Any]:
+        """A function of other textures."""
+        of = [self.json(other, other.kind) for other in value.of]
+        if value.coefficients is not None:
+            coefficients = value.coefficients * scale
+            coefficients[0] += bias
+            return {"type": "multilinear", "of": of, "coefficients": coefficients.tolist()}
+        assert value.table is not None
+        table = value.table
+        if (scale != 1.0).any() or bias.any():
+            table = Baked(table.name, (table.values * scale + bias).astype(np.float32))
+        domain = [list(ends) for ends in value.domain]
+        return {"type": "table", "of": of, "domain": domain, "image": self.image(table)}
 
     def _reading(self, value: AttributeValue) -> str:
         """The scene's name for what is read of an attribute."""

@@ -22,6 +22,7 @@ from .values import (
     Sampling,
     UnsupportedError,
     Value,
+    component,
     convert,
     pick,
 )
@@ -239,11 +240,8 @@ def _separate(
         separate, _ = operators.COLOR_MODELS[mode]
         return ev.combine(node, "float", lambda c: separate(c)[..., [index]], value)
     if not isinstance(value, Constant) and value.channel == "rgb":
-        # A channel of an image costs nothing.
-        kind: Kind = "float"
-        if isinstance(value, ImageValue):
-            return ImageValue(value.source, value.sampling, kind, "rgb"[index])
-        return AttributeValue(value.name, kind, "rgb"[index])
+        # A channel of a texture costs nothing.
+        return component(value, index)
     return ev.combine(node, "float", lambda c: c[..., [index]], value)
 
 

@@ -1,4 +1,4 @@
-"""Values on their way through a node tree: constants, images, and mesh attributes.
+"""Values on their way through a node tree: constants, images, mesh attributes, functions of these.
 
 A value is a float, a colour or a vector; sockets convert between these as Blender's do. Arithmetic
 on images is done on their texels, which is exact but for the order of filtering and arithmetic.
@@ -51,8 +51,8 @@ class ImageSource(Protocol):
     def texels(self) -> np.ndarray:
         """(height, width, 4) float32, linear, row 0 on top."""
 
-    def least(self) -> float:
-        """The smallest number among the texels."""
+    def reach(self) -> tuple[float, float]:
+        """The smallest and the largest number among the texels, as they are stored."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,38 @@ class AttributeValue:
         return np.array(self.affine).reshape(3, 4)
 
 
-Value = Constant | ImageValue | AttributeValue
+@dataclass(frozen=True, eq=False)
+class Composed:
+    """A function of other values, none of them constant, component by component.
+
+    Either `coefficients`, a factor (3) for the product of every subset of them, where bit `i` of
+    its number tells whether value `i` is in it; or a `table` over their `domain`, in the order of
+    the ABI. `reach`: between what the function stays.
+    """
+
+    name: str
+    of: tuple[Value, ...]
+    kind: Kind
+    channel: str
+    reach: tuple[float, float]
+    coefficients: np.ndarray | None = None
+    table: Baked | None = None
+    domain: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.lookups > _MOST_LOOKUPS:
+            raise UnsupportedError(f"a mix of {self.lookups} textures")
+
+    @property
+    def lookups(self) -> int:
+        """How many textures are looked up for it, itself included."""
+        return 1 + sum(value.lookups if isinstance(value, Composed) else 1 for value in self.of)
+
+
+Value = Constant | ImageValue | AttributeValue | Composed
+
+# What the ABI allows.
+_MOST_LOOKUPS = 256
 
 
 @dataclass(eq=False)
@@ -146,9 +177,9 @@ class Baked:
         result[..., :3] = self.values if channels == 3 else np.repeat(self.values, 3, axis=2)
         return result
 
-    def least(self) -> float:
+    def reach(self) -> tuple[float, float]:
         """See `ImageSource`."""
-        return float(self.values.min())
+        return float(self.values.min()), float(self.values.max())
 
 
 def convert(value: Value, kind: Kind) -> Value:
@@ -180,13 +211,15 @@ def array(value: Value) -> np.ndarray:
         return np.array(value.rgb[:width], np.float32).reshape(1, 1, width)
     if isinstance(value, AttributeValue):
         raise UnsupportedError("arithmetic on a mesh attribute")
+    if isinstance(value, Composed):
+        raise UnsupportedError("arithmetic on several textures")
     texels = value.source.texels()
     if value.gain != 1.0:
         texels = texels * np.float32(value.gain)
     return _channel(texels, value)
 
 
-def _channel(texels: np.ndarray, value: ImageValue | AttributeValue) -> np.ndarray:
+def _channel(texels: np.ndarray, value: ImageValue | AttributeValue | Composed) -> np.ndarray:
     """What a value takes of its texels."""
     if value.channel == "rgb":
         return texels[..., :3]
@@ -203,10 +236,30 @@ def average(value: Value) -> Constant:
         return value
     if isinstance(value, AttributeValue):
         return Constant((1.0, 1.0, 1.0), value.kind)
+    if isinstance(value, Composed):
+        return _average_of_composed(value)
     mean = array(value).mean(axis=(0, 1))
     if value.kind == "float":
         return Constant.number(mean[0])
     return replace(Constant.color(mean), kind=value.kind)
+
+
+def _average_of_composed(value: Composed) -> Constant:
+    """A sum of products by its values' averages; of a table the mean of all entries."""
+    means = [np.array(average(of).rgb) for of in value.of]
+    if value.coefficients is not None:
+        products = [
+            np.prod([np.ones(3), *(m for i, m in enumerate(means) if subset >> i & 1)], axis=0)
+            for subset in range(len(value.coefficients))
+        ]
+        found = (value.coefficients * products).sum(axis=0)
+    else:
+        assert value.table is not None
+        found = value.table.values.mean(axis=(0, 1))
+    numbers = _channel(found[None, None], value)[0, 0]
+    if value.kind == "float":
+        return Constant.number(numbers[0])
+    return replace(Constant.color(numbers), kind=value.kind)
 
 
 def pick(source: ImageSource, u: float, v: float, texture_filter: str) -> Constant:
@@ -223,13 +276,21 @@ def pick(source: ImageSource, u: float, v: float, texture_filter: str) -> Consta
     return Constant.color(np.einsum("y,x,yxc", up, across, texels[np.ix_(rows, columns)]))
 
 
-def negative(value: Value) -> bool:
-    """Whether a value is below 0 somewhere. Attributes of meshes are taken to be colours."""
+def bounds(value: Value) -> tuple[float, float]:
+    """Between which numbers a value stays. Attributes of meshes are taken to be colours."""
     if isinstance(value, Constant):
-        return min(value.rgb) < 0.0
+        return min(value.rgb), max(value.rgb)
     if isinstance(value, AttributeValue):
-        return False
-    return value.gain < 0.0 or value.source.least() < 0.0
+        return 0.0, 1.0
+    if isinstance(value, Composed):
+        return value.reach
+    ends = [value.gain * end for end in value.source.reach()]
+    return min(ends), max(ends)
+
+
+def component(value: ImageValue | AttributeValue | Composed, index: int) -> Value:
+    """A component of a colour or vector that is read as such."""
+    return replace(value, kind="float", channel="rgb"[index])
 
 
 def _affine(
@@ -242,7 +303,8 @@ def _affine(
     attributes = [value for value in values if isinstance(value, AttributeValue)]
     first = attributes[0]
     if any(
-        isinstance(value, ImageValue) or getattr(value, "channel", "") == "a" for value in values
+        isinstance(value, ImageValue | Composed) or getattr(value, "channel", "") == "a"
+        for value in values
     ):
         raise UnsupportedError("arithmetic on a mesh attribute")
     if any((other.name, other.factor) != (first.name, first.factor) for other in attributes):

@@ -33,18 +33,32 @@ pub struct NormalMap {
     pub uv: String,
 }
 
+/// The space in which a bump map raises surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum BumpSpace {
+    /// The world's.
+    #[default]
+    World,
+    /// The mesh's own space: what is scaled has its bumps scaled.
+    Object,
+}
+
 /// A bump map: the normal of the surface that would lie `distance * height` above.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BumpMap {
     /// Height.
     pub height: Value,
-    /// Length that a height of one stands for, scene units; negative: heights are depths.
+    /// Length that a height of one stands for, units of the space; negative: heights are depths.
     #[serde(default = "one")]
     pub distance: Value,
     /// 0 leaves the surface's normal, 1 takes the map's.
     #[serde(default = "one")]
     pub strength: Value,
+    /// The space in which the surface is raised.
+    #[serde(default)]
+    pub space: BumpSpace,
     /// What gives the surface that is raised its normal.
     #[serde(default)]
     pub normal: Option<Box<Relief>>,

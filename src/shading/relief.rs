@@ -3,8 +3,8 @@
 use super::material::Materials;
 use super::surface::{SurfacePoint, normal_matrix, normalize_any};
 use crate::math::Frame;
-use crate::scene::relief::{BumpMap, NormalMap, NormalSpace, Relief};
-use glam::{Mat3, Vec3};
+use crate::scene::relief::{BumpMap, BumpSpace, NormalMap, NormalSpace, Relief};
+use glam::{Mat3, Vec2, Vec3};
 
 impl Materials {
     /// The shading frame.
@@ -52,17 +52,29 @@ impl Materials {
     /// The surface's gradient of Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU", along the edges of the triangle.
     fn bumped_normal(&self, map: &BumpMap, p: &SurfacePoint) -> Vec3 {
         let n = map.normal.as_ref().map_or(p.ns, |below| self.relief(below, p));
-        let slopes = self.textures.slopes(&map.height, &p.at);
-        let [e1, e2] = p.edges(&self.scene);
-        // lengths are about one, so that products of those of small triangles are not zero
-        let scale = e1.abs().max(e2.abs()).max_element();
-        let [e1, e2] = [e1, e2].map(|e| e / scale);
-        let (across_2, across_1) = (e2.cross(n), n.cross(e1));
-        let det = e1.dot(across_2);
-        let rise = slopes * (self.textures.number(&map.distance, &p.at) / scale * 1f32.copysign(det));
-        let leaned = normalize_any(n * det.abs() - across_2 * rise.x - across_1 * rise.y);
+        let rise = self.textures.slopes(&map.height, &p.at) * self.textures.number(&map.distance, &p.at);
+        let leaned = match map.space {
+            BumpSpace::World => leaned(n, p.edges(&self.scene), rise),
+            BumpSpace::Object => {
+                let m = Mat3::from(self.scene.instances[p.instance as usize].to_world.matrix3);
+                // the normal's covector goes back by the transpose
+                let own = normalize_any(m.transpose() * n);
+                normalize_any(normal_matrix(m) * leaned(own, p.own_edges(&self.scene), rise))
+            }
+        };
         blended(n, leaned, self.textures.number(&map.strength, &p.at))
     }
+}
+
+/// The normal of a surface with these edges, from a common corner, if it rises by so much along each.
+fn leaned(n: Vec3, [e1, e2]: [Vec3; 2], rise: Vec2) -> Vec3 {
+    // lengths are about one, so that products of those of small triangles are not zero
+    let scale = e1.abs().max(e2.abs()).max_element();
+    let [e1, e2] = [e1, e2].map(|e| e / scale);
+    let (across_2, across_1) = (e2.cross(n), n.cross(e1));
+    let det = e1.dot(across_2);
+    let rise = rise * (1f32.copysign(det) / scale);
+    normalize_any(n * det.abs() - across_2 * rise.x - across_1 * rise.y)
 }
 
 /// Between two unit normals, or beyond the second.

@@ -97,10 +97,15 @@ impl SurfacePoint {
 
     /// The edges of the triangle that leave its first vertex, in the world.
     pub fn edges(&self, scene: &Scene) -> [Vec3; 2] {
+        let matrix = Mat3::from(scene.instances[self.instance as usize].to_world.matrix3);
+        self.own_edges(scene).map(|e| matrix * e)
+    }
+
+    /// The same in the mesh's own space.
+    pub fn own_edges(&self, scene: &Scene) -> [Vec3; 2] {
         let mesh: &Mesh = &scene.meshes[self.at.mesh as usize];
         let [a, b, c] = mesh.triangles[self.at.triangle as usize].map(|i| mesh.positions[i as usize]);
-        let matrix = Mat3::from(scene.instances[self.instance as usize].to_world.matrix3);
-        [matrix * (b - a), matrix * (c - a)]
+        [b - a, c - a]
     }
 
     /// The world-space derivative of the position by u of a UV set, or zero where it has none.

@@ -338,6 +338,75 @@ def case_noise() -> None:
         _check_floor(inputs, space, as_bumps)
 
 
+def _masked(
+    tree: bpy.types.NodeTree, picture: bpy.types.Node, noise: bpy.types.Node
+) -> bpy.types.Node:
+    """The picture, with another colour where the noise is strong."""
+    steep, mix = tree.nodes.new("ShaderNodeMapRange"), tree.nodes.new("ShaderNodeMix")
+    steep.inputs["From Min"].default_value, steep.inputs["From Max"].default_value = 0.4, 0.6
+    mix.data_type = "RGBA"
+    inputs = {entry.identifier: entry for entry in mix.inputs}
+    tree.links.new(noise.outputs[0], steep.inputs["Value"])
+    tree.links.new(steep.outputs[0], inputs["Factor_Float"])
+    tree.links.new(picture.outputs["Color"], inputs["A_Color"])
+    inputs["B_Color"].default_value = (0.7, 0.2, 0.05, 1)
+    return mix
+
+
+def _overlaid(
+    tree: bpy.types.NodeTree, picture: bpy.types.Node, noise: bpy.types.Node
+) -> bpy.types.Node:
+    """The picture over the noise, and its hue turned: no sum of products."""
+    over, turn = tree.nodes.new("ShaderNodeMixRGB"), tree.nodes.new("ShaderNodeHueSaturation")
+    over.blend_type = "OVERLAY"
+    over.inputs["Fac"].default_value = 0.9
+    turn.inputs["Hue"].default_value, turn.inputs["Saturation"].default_value = 0.6, 0.8
+    tree.links.new(noise.outputs[0], over.inputs["Color1"])
+    tree.links.new(picture.outputs["Color"], over.inputs["Color2"])
+    tree.links.new(over.outputs["Color"], turn.inputs["Color"])
+    return turn
+
+
+def _compared(
+    tree: bpy.types.NodeTree, picture: bpy.types.Node, noise: bpy.types.Node
+) -> bpy.types.Node:
+    """One channel where the picture is brighter than the noise, and the two in the others."""
+    where, parts = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("ShaderNodeCombineColor")
+    where.operation = "GREATER_THAN"
+    tree.links.new(picture.outputs["Color"], where.inputs[0])
+    tree.links.new(noise.outputs[0], where.inputs[1])
+    for index, source in enumerate((where, noise, picture)):
+        tree.links.new(source.outputs[0], parts.inputs[index])
+    return parts
+
+
+def case_textures_of_several() -> None:
+    """A picture and noise, each looked up elsewhere, as one colour and as one height."""
+    smooth = np.ones((64, 64, 4), np.float32)
+    v, u = np.mgrid[0:64, 0:64] / 64.0
+    smooth[..., 0] = 0.5 + 0.4 * np.sin(2 * np.pi * u)
+    smooth[..., 1] = 0.5 + 0.4 * np.cos(2 * np.pi * v)
+    smooth[..., 2] = 0.5 + 0.3 * np.sin(2 * np.pi * (u + v))
+    for made in (_masked, _overlaid, _compared, None):
+        tree, picture, diffuse = _floor_of("TexImage", "UV")
+        picture.image = builders.image("Smooth", smooth, "Non-Color", is_float=True)
+        noise, place = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeTexCoord")
+        noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = 2.0, 1.0
+        tree.links.new(place.outputs["Object"], noise.inputs["Vector"])
+        if made:
+            tree.links.new(made(tree, picture, noise).outputs[0], diffuse.inputs["Color"])
+        else:
+            both, bump = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("ShaderNodeBump")
+            both.operation = "MULTIPLY"
+            bump.inputs["Distance"].default_value = 0.06
+            tree.links.new(picture.outputs["Color"], both.inputs[0])
+            tree.links.new(noise.outputs[0], both.inputs[1])
+            tree.links.new(both.outputs[0], bump.inputs["Height"])
+            tree.links.new(bump.outputs["Normal"], diffuse.inputs["Normal"])
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        _check_floor(made.__name__ if made else "bumps")
+
+
 def case_gradients_and_waves() -> None:
     """Through a colour ramp, on floor and ball."""
     for kind, properties, scale, space in (
@@ -423,6 +492,24 @@ def case_bump_maps_look_alike() -> None:
         found = agreement.compare(*agreement.render_both(96, 72, 256, 256))
         # Cycles takes slopes across a pixel, Segue across a texel: highlights end elsewhere.
         _check(found, mean=0.008, blocks=0.04, correlation=0.999)
+
+
+def case_displacement_looks_alike() -> None:
+    """Bumps by displacement, of objects of another size than one."""
+    for space in ("OBJECT", "WORLD"):
+        tree, noise, _ = _floor_of("TexNoise", "Object")
+        noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = 3.0, 1.0
+        raised = tree.nodes.new("ShaderNodeDisplacement")
+        raised.space = space
+        raised.inputs["Scale"].default_value = 0.06
+        tree.links.new(noise.outputs[0], raised.inputs["Height"])
+        output = tree.get_output_node("CYCLES")
+        tree.links.new(raised.outputs[0], output.inputs["Displacement"])
+        bpy.data.materials["Floor"].displacement_method = "BUMP"
+        ball = bpy.data.objects["Ball"]
+        ball.data.materials[0] = bpy.data.materials["Floor"]
+        ball.matrix_world = ball.matrix_world @ Matrix.Diagonal((1.3, 1.3, 0.8, 1))
+        _check_floor(space)
 
 
 def case_coarse_smoothed_mirrors_have_no_dark_rims() -> None:

@@ -411,7 +411,7 @@ def case_unsupported_nodes_are_named_once() -> None:
     surface, _, warnings = tree.export()
     assert len(warnings) == 1 and "Voronoi Texture" in warnings[0], warnings
     _close(surface["color"], 0.5)
-    # Two images that are looked up differently cannot be multiplied; their means are.
+    # Two images that are looked up differently are multiplied where they are looked up.
     first, second = tree.node("TexImage"), tree.node("TexImage")
     first.image = builders.image("First", np.full((2, 2, 4), (0.2, 0.4, 0.6, 1)), "Non-Color")
     second.image = builders.image("Second", np.full((2, 2, 4), (0.8, 0.8, 0.8, 1)), "Non-Color")
@@ -422,9 +422,12 @@ def case_unsupported_nodes_are_named_once() -> None:
     tree.link(second.outputs[0], mix.inputs[2])
     tree.link(mix.outputs[0], diffuse.inputs["Color"])
     tree.tree.links.remove(diffuse.inputs["Roughness"].links[0])
-    surface, _, warnings = tree.export()
-    assert len(warnings) == 1 and "different mappings" in warnings[0], warnings
-    np.testing.assert_allclose(surface["color"], (0.16, 0.32, 0.48), atol=5e-3)
+    surface, scene, warnings = tree.export()
+    assert not warnings, warnings
+    product = scene.textures[surface["color"]["texture"]][1]
+    np.testing.assert_allclose(product["coefficients"], [[0] * 3] * 3 + [[1] * 3], atol=1e-6)
+    names = [scene.textures[of["texture"]][0] for of in product["of"]]
+    assert names == ["First", "Second"], names
 
 
 def case_missing_images_are_magenta() -> None:
@@ -459,14 +462,55 @@ def case_outputs() -> None:
     _close(tree.export()[0]["color"], 0.0)
 
 
-def case_volume_and_displacement_are_named() -> None:
+def case_volumes_are_named() -> None:
     tree = Tree()
-    volume, displacement = tree.node("VolumeScatter"), tree.node("Displacement")
+    volume = tree.node("VolumeScatter")
     tree.link(volume.outputs[0], tree.output.inputs["Volume"])
-    tree.link(displacement.outputs[0], tree.output.inputs["Displacement"])
     surface, _, warnings = tree.export()
     assert surface["type"] == "transparent"
-    assert len(warnings) == 2, warnings
+    assert len(warnings) == 1 and "Volume Scatter" in warnings[0], warnings
+
+
+def case_displacement_is_a_bump_map() -> None:
+    tree = Tree()
+    shader, cover = tree.node("BsdfPrincipled"), tree.node("BsdfDiffuse")
+    both = tree.surface(tree.node("AddShader"))
+    tree.link(shader.outputs[0], both.inputs[0])
+    tree.link(cover.outputs[0], both.inputs[1])
+    raised = tree.node("Displacement", Midlevel=0.25, Scale=0.5)
+    tree.link(raised.outputs[0], tree.output.inputs["Displacement"])
+    for method, named in (("BUMP", 0), ("BOTH", 1), ("DISPLACEMENT", 1)):
+        tree.material.displacement_method = method
+        # The same everywhere, it shows only if the surface is moved.
+        raised.inputs["Height"].default_value = 0.75
+        surface, _, warnings = tree.export()
+        assert "normal" not in surface["a"] and len(warnings) == named, (method, warnings)
+    image = tree.node("TexImage")
+    pixels = np.full((2, 2, 4), 0.75, np.float32)
+    image.image = builders.image("Heights", pixels, "Non-Color", is_float=True)
+    tree.link(image.outputs["Color"], raised.inputs["Height"])
+    for method, named in (("BUMP", 0), ("BOTH", 1), ("DISPLACEMENT", 1)):
+        tree.material.displacement_method = method
+        surface, scene, warnings = tree.export()
+        assert len(warnings) == named, (method, warnings)
+        for part, key in (("a", "normal"), ("a", "coat_normal"), ("b", "normal")):
+            assert surface[part][key]["space"] == "object", surface
+            texture = scene.textures[surface[part][key]["height"]["texture"]][1]
+            _close(scene.images[texture["image"]]["pixels"][0, 0, 0], 0.25)
+    # A bump map is raised over it, a normal map takes its place.
+    bump, waves = tree.node("Bump"), tree.node("TexWave")
+    tree.link(waves.outputs[0], bump.inputs["Height"])
+    tree.link(bump.outputs[0], cover.inputs["Normal"])
+    flat = tree.node("NormalMap")
+    tree.link(image.outputs["Color"], flat.inputs["Color"])
+    tree.link(flat.outputs[0], shader.inputs["Normal"])
+    raised.space = "WORLD"
+    surface, _, _ = tree.export()
+    assert surface["b"]["normal"]["normal"]["space"] == "world"
+    assert "height" not in surface["a"]["normal"] and "height" in surface["a"]["coat_normal"]
+    vector = tree.node("VectorDisplacement")
+    tree.link(vector.outputs[0], tree.output.inputs["Displacement"])
+    assert any("by a vector" in text for text in tree.export()[2])
 
 
 def case_insides_absorb() -> None:

@@ -273,7 +273,76 @@ def case_arithmetic_on_vertex_colours() -> None:
     name = scene.textures[surface["color"]["texture"]][1]["name"]
     found = {attribute.name: attribute for attribute in scene.meshes[0]["attributes"]}
     _close(found[name].data[:, :3], values[:, :3] * (0.75, 0.625, 1.0))
-    # What is done before or after the interpolation must be the same.
+    # What is not the same before and after the interpolation is done after it, by a table.
+    tint.blend_type = "DIVIDE"
+    tint.inputs["Fac"].default_value = 1.0
     tint.use_clamp = True
+    surface, scene, warnings = tree.export()
+    assert not warnings, warnings
+    table = scene.textures[surface["color"]["texture"]][1]
+    row = scene.images[table["image"]]["pixels"][0, :, :3]
+    at = np.linspace(*table["domain"][0], len(row))
+    # but for the means around the entries
+    wanted = np.minimum(at[:, None] / (0.5, 0.25, 1.0), 1.0)
+    assert table["type"] == "table" and table["domain"] == [[0.0, 1.0]]
+    np.testing.assert_allclose(row, wanted, atol=2e-3)
+    assert scene.textures[table["of"][0]["texture"]][1]["name"] == "Paint"
+
+
+def _noises(tree: Tree, count: int) -> list[bpy.types.Node]:
+    noises = [tree.node("TexNoise") for _ in range(count)]
+    for number, noise in enumerate(noises):
+        noise.inputs["Scale"].default_value = 1.0 + number
+    return noises
+
+
+def case_functions_of_several_textures() -> None:
+    """What is linear in each is a sum of products, what is not a table, also in such sums."""
+    for blend, kinds in (
+        ("MIX", ["multilinear"]),
+        ("SCREEN", ["multilinear"]),
+        ("DIFFERENCE", ["multilinear", "table"]),
+        ("COLOR", None),
+    ):
+        tree = Tree()
+        mix = tree.node("MixRGB")
+        mix.blend_type = blend
+        for noise, entry in zip(_noises(tree, 3), mix.inputs, strict=True):
+            tree.link(noise.outputs[0], entry)
+        shader = tree.surface(tree.node("BsdfDiffuse"))
+        tree.link(mix.outputs[0], shader.inputs["Color"])
+        surface, scene, warnings = tree.export()
+        made = {data["type"] for _, data in scene.textures}
+        if kinds is None:
+            # Hues are no matter of single components.
+            assert any("several textures" in text for text in warnings), warnings
+            continue
+        assert not warnings and made == {"noise", *kinds}, (blend, made, warnings)
+        assert scene.textures[surface["color"]["texture"]][1]["type"] == "multilinear"
+        bpy.data.objects.remove(tree.item)
+        bpy.data.materials.remove(tree.material)
+
+
+def case_mixes_of_too_many_textures_are_named() -> None:
+    tree = Tree()
+    shader = tree.surface(tree.node("BsdfDiffuse"))
+    noises = _noises(tree, 10)
+    # Each doubles what is looked up.
+    source = noises[0]
+    for noise in noises[1:]:
+        product, mix = tree.node("Math"), tree.node("Math")
+        product.operation, mix.operation = "MULTIPLY", "MULTIPLY_ADD"
+        tree.link(source.outputs[0], product.inputs[0])
+        tree.link(noise.outputs[0], product.inputs[1])
+        for entry, node in zip(mix.inputs, (source, product, product), strict=True):
+            tree.link(node.outputs[0], entry)
+        source = mix
+    tree.link(source.outputs[0], shader.inputs["Roughness"])
     _, _, warnings = tree.export()
-    assert any("more than scale and shift" in text for text in warnings), warnings
+    assert any("a mix of" in text and "averages are used" in text for text in warnings), warnings
+    # Five at once are named as well.
+    spread = tree.node("MapRange")
+    for noise, entry in zip(noises, list(spread.inputs)[:5], strict=False):
+        tree.link(noise.outputs[0], entry)
+    tree.link(spread.outputs[0], shader.inputs["Roughness"])
+    assert any("5 textures at once" in text for text in tree.export()[2])

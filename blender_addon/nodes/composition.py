@@ -1,0 +1,224 @@
+"""Functions of several textures: as sums of products, or as tables, whichever holds them.
+
+A texture is one picture, one noise or one attribute. What nodes make of several is found by trying
+the function out: most mixes are linear in each of their inputs, and what is not is tabulated where
+it works on each component alone. What is linear in some input is split there, and its halves are
+tried in turn.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .values import (
+    Baked,
+    Composed,
+    Constant,
+    Kind,
+    UnsupportedError,
+    Value,
+    array,
+    bounds,
+    component,
+)
+
+# Inputs that a texture may be made of.
+_MOST = 3
+# Entries along each side of tables of one, two and three values.
+_SIZES = {1: 1024, 2: 256, 3: 33}
+# Largest value of a colour for which a table of three is fine enough.
+_BRIGHT = 2.0
+# Points at which a function is compared with what is to stand for it.
+_PROBES = 64
+
+Function = Callable[..., np.ndarray]
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A function of some values, none of which is constant."""
+
+    name: str
+    kind: Kind
+    function: Function
+    of: tuple[Value, ...]
+
+    def __call__(self, *inputs: np.ndarray) -> np.ndarray:
+        """The function of rows (points, 3) of inputs, as such rows."""
+        rows = [
+            row[None, :, :1] if value.kind == "float" else row[None]
+            for row, value in zip(inputs, self.of, strict=True)
+        ]
+        with np.errstate(all="ignore"):
+            found = np.nan_to_num(self.function(*rows), nan=0.0, posinf=0.0, neginf=0.0)
+        found = np.broadcast_to(np.asarray(found, np.float64), (1, len(inputs[0]), found.shape[-1]))
+        return np.broadcast_to(found[0], (len(inputs[0]), 3))
+
+    @property
+    def domain(self) -> list[tuple[float, float]]:
+        """Of each input, at least from 0 to 1."""
+        found = [bounds(value) for value in self.of]
+        return [(min(low, 0.0), max(high, 1.0)) for low, high in found]
+
+    def probes(self) -> list[np.ndarray]:
+        """Points all over the domain, the same every time."""
+        numbers = np.random.default_rng(1)
+        rows = [low + (high - low) * numbers.random((_PROBES, 3)) for low, high in self.domain]
+        return [
+            row if value.kind != "float" else np.repeat(row[:, :1], 3, axis=1)
+            for row, value in zip(rows, self.of, strict=True)
+        ]
+
+
+def _alike(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.allclose(a, b, rtol=1e-4, atol=1e-5 * max(1.0, float(np.abs(b).max()))))
+
+
+def compose(name: str, kind: Kind, function: Function, *values: Value) -> Value:
+    """`function` of values that no single picture holds."""
+    arrays = [array(value) if isinstance(value, Constant) else None for value in values]
+    of = tuple(value for value in values if not isinstance(value, Constant))
+
+    def of_the_others(*inputs: np.ndarray) -> np.ndarray:
+        rest = iter(inputs)
+        return function(*(next(rest) if fixed is None else fixed for fixed in arrays))
+
+    return _composed(_Problem(name, kind, of_the_others, of))
+
+
+def _composed(problem: _Problem) -> Value:
+    if len(problem.of) > _MOST:
+        raise UnsupportedError(f"arithmetic on {len(problem.of)} textures at once")
+    for attempt in (_multilinear, _table, _split):
+        found = attempt(problem)
+        if found is not None:
+            return found
+    raise UnsupportedError("arithmetic of this kind on several textures")
+
+
+def _subsets(count: int) -> range:
+    return range(1 << count)
+
+
+def _products(inputs: list[np.ndarray]) -> list[np.ndarray]:
+    """The products of every subset of inputs, in the order of `segue`'s coefficients."""
+    ones = np.ones_like(inputs[0])
+    return [
+        np.prod([ones, *(row for i, row in enumerate(inputs) if subset >> i & 1)], axis=0)
+        for subset in _subsets(len(inputs))
+    ]
+
+
+def _multilinear(problem: _Problem) -> Value | None:
+    count = len(problem.of)
+    ends = [
+        np.array([[float(subset >> i & 1)] * 3 for subset in _subsets(count)]) for i in range(count)
+    ]
+    coefficients = problem(*ends).copy()
+    # From the values at the corners to the factors of products: differences along each input.
+    for i in range(count):
+        for subset in _subsets(count):
+            if subset >> i & 1:
+                coefficients[subset] -= coefficients[subset ^ (1 << i)]
+    probes = problem.probes()
+    sums = sum(c * p for c, p in zip(coefficients, _products(probes), strict=True))
+    if not _alike(problem(*probes), np.asarray(sums)):
+        return None
+    at = np.meshgrid(*problem.domain, indexing="ij")
+    corners = problem(*(np.repeat(side.reshape(-1, 1), 3, axis=1) for side in at))
+    reach = (float(corners.min()), float(corners.max()))
+    return Composed(
+        problem.name, problem.of, problem.kind, _channel(problem), reach, coefficients=coefficients
+    )
+
+
+def _channel(problem: _Problem) -> str:
+    return "r" if problem.kind == "float" else "rgb"
+
+
+def _table(problem: _Problem) -> Value | None:
+    of, domain = problem.of, problem.domain
+    if len(of) > 2:
+        return None
+    probes = problem.probes()
+    found = problem(*probes)
+    alone = np.stack(
+        [problem(*(np.repeat(row[:, [c]], 3, axis=1) for row in probes))[:, c] for c in range(3)],
+        axis=-1,
+    )
+    if _alike(alone, found):
+        picture = _tabulated(problem, _SIZES[len(of)])
+    elif len(of) == 1 and of[0].channel == "rgb" and domain[0][1] <= _BRIGHT:
+        # Colours that become others as a whole: a table of their three components.
+        side = _SIZES[3]
+        along = np.linspace(*domain[0], side)
+        blue, green, red = np.meshgrid(along, along, along, indexing="ij")
+        values = problem(np.stack([red.ravel(), green.ravel(), blue.ravel()], axis=-1))
+        picture = values.reshape(side * side, side, 3)
+        of = tuple(component(of[0], index) for index in range(3))
+        domain = domain * 3
+    else:
+        return None
+    reach = (float(picture.min()), float(picture.max()))
+    table = Baked(problem.name, picture.astype(np.float32))
+    return Composed(
+        problem.name, of, problem.kind, _channel(problem), reach, table=table, domain=tuple(domain)
+    )
+
+
+def _tabulated(problem: _Problem, side: int) -> np.ndarray:
+    """A table of a function of one or two values, of the means around its entries.
+
+    Of the entries alone, steps where both values are equal would be half an entry aside.
+    """
+    step = 1.0 / (side - 1)
+    along = np.linspace(0.0, 1.0, side)
+    around = [np.clip(along + by * step, 0.0, 1.0) for by in (-0.25, 0.25)]
+    found = []
+    for sides in itertools.product(around, repeat=len(problem.of)):
+        scaled = [
+            low + (high - low) * side
+            for side, (low, high) in zip(sides, problem.domain, strict=True)
+        ]
+        at = np.meshgrid(*scaled, indexing="xy")
+        found.append(problem(*(np.repeat(row.reshape(-1, 1), 3, axis=1) for row in at)))
+    return np.mean(found, axis=0).reshape(-1, side, 3)
+
+
+def _split(problem: _Problem) -> Value | None:
+    """Between what the function is at 0 and at 1 of an input in which it is linear."""
+    if len(problem.of) < 2:
+        return None
+    probes = problem.probes()
+    found = problem(*probes)
+    for i, value in enumerate(problem.of):
+
+        def at(end: float, i: int = i) -> np.ndarray:
+            rows = [np.full_like(row, end) if k == i else row for k, row in enumerate(probes)]
+            return problem(*rows)
+
+        low, high = at(0.0), at(1.0)
+        if not _alike(low + (high - low) * probes[i], found):
+            continue
+        halves = [_composed(_without(problem, i, end)) for end in (0.0, 1.0)]
+        between = _Problem(
+            problem.name, problem.kind, lambda t, a, b: a + (b - a) * t, (value, *halves)
+        )
+        return _multilinear(between)
+    return None
+
+
+def _without(problem: _Problem, index: int, end: float) -> _Problem:
+    """The same with one input fixed."""
+    width = 1 if problem.of[index].kind == "float" else 3
+
+    def function(*inputs: np.ndarray) -> np.ndarray:
+        fixed = np.full((1, 1, width), end)
+        return problem.function(*inputs[:index], fixed, *inputs[index:])
+
+    rest = (*problem.of[:index], *problem.of[index + 1 :])
+    return _Problem(problem.name, problem.kind, function, rest)
