@@ -28,10 +28,12 @@ from .values import (
 
 # Inputs that a texture may be made of.
 _MOST = 3
-# Entries along each side of tables of one, two and three values.
-_SIZES = {1: 1024, 2: 256, 3: 33}
-# Largest value of a colour for which a table of three is fine enough.
-_BRIGHT = 2.0
+# Entries for each unit along tables of one value, and at most; along each side of those of two, and
+# of the components of a colour.
+_ROW, _LONGEST_ROW = 1024, 16384
+_SQUARE, _CUBE = 256, 33
+# Spans over which squares and cubes are fine enough.
+_WIDEST_SQUARE, _WIDEST_CUBE = 4.0, 2.0
 # Points at which a function is compared with what is to stand for it.
 _PROBES = 64
 
@@ -150,15 +152,18 @@ def _table(problem: _Problem) -> Value | None:
         [problem(*(np.repeat(row[:, [c]], 3, axis=1) for row in probes))[:, c] for c in range(3)],
         axis=-1,
     )
+    widest = max(high - low for low, high in domain)
     if _alike(alone, found):
-        picture = _tabulated(problem, _SIZES[len(of)])
-    elif len(of) == 1 and of[0].channel == "rgb" and domain[0][1] <= _BRIGHT:
+        if len(of) == 2 and widest > _WIDEST_SQUARE:
+            return None
+        side = _SQUARE if len(of) == 2 else int(min(_ROW * widest, _LONGEST_ROW))
+        picture = _tabulated(problem, side)
+    elif len(of) == 1 and of[0].channel == "rgb" and widest <= _WIDEST_CUBE:
         # Colours that become others as a whole: a table of their three components.
-        side = _SIZES[3]
-        along = np.linspace(*domain[0], side)
+        along = np.linspace(*domain[0], _CUBE)
         blue, green, red = np.meshgrid(along, along, along, indexing="ij")
         values = problem(np.stack([red.ravel(), green.ravel(), blue.ravel()], axis=-1))
-        picture = values.reshape(side * side, side, 3)
+        picture = values.reshape(_CUBE * _CUBE, _CUBE, 3)
         of = tuple(component(of[0], index) for index in range(3))
         domain = domain * 3
     else:

@@ -12,6 +12,9 @@ from mathutils import Euler
 from .tree import Source, Stack, resolve, socket
 from .values import Constant, UnsupportedError, Value
 
+#: The texture transform that changes nothing.
+AS_IT_IS = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
 # Gives the value of an input socket.
 Evaluate = Callable[[bpy.types.NodeSocket, Stack], Value]
 
@@ -27,18 +30,18 @@ class Coordinates:
     uv: str
     matrix: np.ndarray
 
+    def by(self, matrix: np.ndarray) -> Coordinates:
+        """A 4x4 matrix times these."""
+        return replace(self, matrix=matrix @ self.matrix)
+
     def scaled(self, factor: float) -> Coordinates:
         """The same times a number."""
-        return replace(self, matrix=np.diag([factor, factor, factor, 1.0]) @ self.matrix)
-
-    def shifted(self, offset: float) -> Coordinates:
-        """The same plus a number."""
-        return replace(self, matrix=_shift(np.full(3, offset)) @ self.matrix)
+        return self.by(np.diag([factor, factor, factor, 1.0]))
 
     def along(self, row: Sequence[float]) -> Coordinates:
         """`row` (4) times these, as the first coordinate; the others are constant."""
         rest = [[0.0, 0.0, 0.0, height] for height in (0.5, 0.0, 1.0)]
-        return replace(self, matrix=np.array([row, *rest]) @ self.matrix)
+        return self.by(np.array([row, *rest]))
 
     def uv_transform(self) -> tuple[float, ...]:
         """The six numbers of the ABI's texture transform; UV maps have a third component of 0."""
@@ -74,7 +77,7 @@ def _shift(offset: np.ndarray) -> np.ndarray:
     return result
 
 
-def _mapping(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> np.ndarray:
+def mapping(node: bpy.types.Node, stack: Stack, evaluate: Evaluate) -> np.ndarray:
     """Matrix of a Mapping node."""
     rotation = _linear(
         np.array(Euler(_constant(node.inputs["Rotation"], stack, evaluate), "XYZ").to_matrix())
@@ -153,13 +156,13 @@ def coordinates(
             return Coordinates(space, "", _everywhere((matrix @ [*constant, 1.0])[:3]))
         stack = source.stack
         if node.bl_idname == "ShaderNodeMapping":
-            matrix = matrix @ _mapping(node, stack, evaluate)
+            matrix = matrix @ mapping(node, stack, evaluate)
             entry = node.inputs["Vector"]
         elif node.bl_idname == "ShaderNodeVectorMath":
             step, entry = _vector_math(node, stack, evaluate)
             matrix = matrix @ step
         else:
-            space, uv = _origin(source, world)
+            space, uv = origin(source, world)
             return Coordinates(space, uv, matrix)
 
 
@@ -182,7 +185,7 @@ def _everywhere(point: np.ndarray) -> np.ndarray:
     return result
 
 
-def _origin(source: Source, world: bool) -> tuple[str, str]:
+def origin(source: Source, world: bool) -> tuple[str, str]:
     """What a node provides at the start of a chain: a space, and the name of a UV map."""
     node, name = source.node, source.output.identifier
     kind = node.bl_idname

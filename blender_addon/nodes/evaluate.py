@@ -9,6 +9,7 @@ import numpy as np
 
 from ..log import ExportLog
 from .composition import compose
+from .coordinates import AS_IT_IS
 from .textures import TextureStore
 from .tree import Source, Stack, resolve, socket
 from .value_nodes import VALUE_NODES
@@ -183,7 +184,7 @@ class Evaluator:
         ):
             source = self.textures.source(node.image, straight_alpha=output.identifier == "Alpha")
             channel = "a" if output.identifier == "Alpha" else "rgb"
-            return average(ImageValue(source, Sampling("uv", (1, 0, 0, 0, 1, 0)), kind, channel))
+            return average(ImageValue(source, Sampling("uv", AS_IT_IS), kind, channel))
         colors = [entry for entry in node.inputs if entry.type == "RGBA" and entry.enabled]
         if kind != "float" and colors:
             mean = np.mean([average(self.value(entry, stack)).rgb for entry in colors], axis=0)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from .coordinates import Coordinates, coordinates
+from .coordinates import AS_IT_IS, Coordinates
+from .places import looked_up, turned
 from .tree import Stack
 from .values import Baked, Constant, ImageValue, Sampling, UnsupportedError, Value, convert
 
@@ -44,23 +45,37 @@ _BANDS = {
 }
 
 
-def _place(ev: Evaluator, node: bpy.types.Node, stack: Stack) -> Coordinates:
-    place = coordinates(node.inputs["Vector"], stack, ev.value, world=ev.world, default="generated")
-    if place.space == "environment":
+def _place(ev: Evaluator, node: bpy.types.Node, stack: Stack) -> Coordinates | Value:
+    place = looked_up(ev, node, stack, "generated")
+    if isinstance(place, Coordinates) and place.space == "environment":
         raise UnsupportedError("a texture of this kind in this place")
     return place
 
 
-def _steady(place: Coordinates, scale: float) -> Coordinates:
-    """Scaled, and moved as Cycles does it to keep whole numbers from flickering."""
-    return place.scaled(scale).shifted(1e-6).scaled(0.999999)
+def _steady(scale: float) -> np.ndarray:
+    """Scales, and moves as Cycles does it to keep whole numbers from flickering."""
+    result = np.diag([scale, scale, scale, 1.0])
+    result[:3, 3] = 1e-6
+    return np.diag([0.999999] * 3 + [1.0]) @ result
 
 
-def _row(ev: Evaluator, place: Coordinates, values: np.ndarray, wrap: str) -> ImageValue:
-    """A picture of one row, looked up by the first coordinate."""
-    uv, transform = ev.textures.place(place)
+def _row(
+    ev: Evaluator,
+    node: bpy.types.Node,
+    place: Coordinates | Value,
+    row: np.ndarray,
+    values: np.ndarray,
+    wrap: str,
+) -> ImageValue:
+    """A picture of one row, looked up by `row` (4) times x, y, z and 1."""
     picture = Baked("Pattern", values.astype(np.float32)[None, :, None])
-    return ImageValue(picture, Sampling("uv", transform, uv, wrap), "float", "r")
+    if isinstance(place, Coordinates):
+        uv, transform = ev.textures.place(place.along(row))
+        sampling = Sampling("uv", transform, uv, wrap)
+    else:
+        matrix = np.array([row, [0, 0, 0, 0.5], [0, 0, 0, 0], [0, 0, 0, 1]])
+        sampling = Sampling("uv", AS_IT_IS, "", wrap, at=turned(ev, node, place, matrix))
+    return ImageValue(picture, sampling, "float", "r")
 
 
 def _shown(value: ImageValue, output: bpy.types.NodeSocket) -> Value:
@@ -71,7 +86,10 @@ def checker(
     ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
 ) -> Value:
     """Checker Texture, as a picture of four texels for what is level in its third coordinate."""
-    steps = _steady(_place(ev, node, stack), ev.number(node.inputs["Scale"], stack))
+    place = _place(ev, node, stack)
+    if not isinstance(place, Coordinates):
+        raise UnsupportedError("a checker by computed coordinates")
+    steps = place.by(_steady(ev.number(node.inputs["Scale"], stack)))
     uv, transform = ev.textures.place(steps.scaled(0.5), in_layers=True)
     squares = ImageValue(_SQUARES, Sampling("uv", transform, uv, "repeat", "closest"), "float", "r")
     if output.identifier != "Color":
@@ -89,8 +107,9 @@ def gradient(
     curve, row = _GRADIENTS[node.gradient_type]
     # From the middle of the first texel to that of the last.
     along = np.array(row) * (_SIZE - 1) / _SIZE + np.array([0.0, 0.0, 0.0, 0.5 / _SIZE])
-    place = _place(ev, node, stack).along(along)
-    return _shown(_row(ev, place, curve(np.linspace(0.0, 1.0, _SIZE)), "clamp"), output)
+    place = _place(ev, node, stack)
+    values = curve(np.linspace(0.0, 1.0, _SIZE))
+    return _shown(_row(ev, node, place, along, values, "clamp"), output)
 
 
 def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
@@ -99,11 +118,12 @@ def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stac
         raise UnsupportedError("waves in rings")
     if ev.value(node.inputs["Distortion"], stack) != Constant.number(0.0):
         ev.simplify(node, "distortion", "even waves are used")
-    steps = _steady(_place(ev, node, stack), ev.number(node.inputs["Scale"], stack))
+    steps = _steady(ev.number(node.inputs["Scale"], stack))
     phase = ev.number(node.inputs["Phase Offset"], stack)
     turns = np.array([*_BANDS[node.bands_direction], phase]) / (2.0 * np.pi)
     values = _PROFILES[node.wave_profile]((np.arange(_SIZE) + 0.5) / _SIZE)
-    return _shown(_row(ev, steps.along(turns), values, "repeat"), output)
+    place = _place(ev, node, stack)
+    return _shown(_row(ev, node, place, turns @ steps, values, "repeat"), output)
 
 
 def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
@@ -116,11 +136,16 @@ def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, sta
         raise UnsupportedError("noise that is not normalized")
     if output.identifier == "Color":
         ev.simplify(node, "coloured noise", "grey noise is used")
-    place = _place(ev, node, stack).scaled(ev.number(node.inputs["Scale"], stack))
-    numbers = [
+    place = _place(ev, node, stack)
+    scale = ev.number(node.inputs["Scale"], stack)
+    numbers = tuple(
         ev.number(node.inputs[name], stack)
         for name in ("Detail", "Roughness", "Lacunarity", "Distortion")
-    ]
-    sampling = Sampling("noise", tuple(numbers), ev.textures.solid(place), "clamp")
+    )
+    if isinstance(place, Coordinates):
+        sampling = Sampling("noise", numbers, ev.textures.solid(place.scaled(scale)), "clamp")
+    else:
+        scaled = turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
+        sampling = Sampling("noise", numbers, "", "clamp", at=scaled)
     ramp = Baked("Noise", np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[None, :, None])
     return _shown(ImageValue(ramp, sampling, "float", "r"), output)

@@ -12,7 +12,7 @@ import numpy as np
 from ..export.images import Pixels, read_image
 from ..export.mesh import Projection, Reading
 from ..log import ExportLog
-from .coordinates import Coordinates
+from .coordinates import AS_IT_IS, Coordinates
 from .values import (
     AttributeValue,
     Baked,
@@ -21,6 +21,7 @@ from .values import (
     ImageSource,
     ImageValue,
     Kind,
+    PlaceValue,
     UnsupportedError,
     Value,
 )
@@ -98,7 +99,7 @@ class TextureStore:
             shift = 0.5 * (np.floor(2.0 * depth[3]) % 2) if in_layers else 0.0
             transform = place.uv_transform()
             return place.uv, (*transform[:2], transform[2] + shift, *transform[3:])
-        return self._projected(place, 2, in_layers), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        return self._projected(place, 2, in_layers), AS_IT_IS
 
     def solid(self, place: Coordinates) -> str:
         """The attribute that holds three coordinates."""
@@ -128,19 +129,24 @@ class TextureStore:
 
     def texture(
         self,
-        value: ImageValue | AttributeValue | Composed,
+        value: ImageValue | AttributeValue | PlaceValue | Composed,
         scale: Sequence[float] = (1.0, 1.0, 1.0),
         bias: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> int:
         """Id of the texture that yields `scale * value + bias`; an attribute is never scaled."""
-        name = value.name if not isinstance(value, ImageValue) else value.source.name
-        if isinstance(value, AttributeValue):
+        data: dict[str, Any]
+        if isinstance(value, PlaceValue):
+            name = self.solid(value.place)
+            data = {"type": "attribute", "name": name, "default": [0.0, 0.0, 0.0, 1.0]}
+        elif isinstance(value, AttributeValue):
             name = self._reading(value)
             default = [*value.matrix[:, 3].tolist(), 1.0]
-            data: dict[str, Any] = {"type": "attribute", "name": name, "default": default}
+            data = {"type": "attribute", "name": name, "default": default}
         elif isinstance(value, Composed):
+            name = value.name
             data = self._composed(value, np.array(scale), np.array(bias))
         else:
+            name = value.source.name
             data = self._picture(value)
             data["scale"] = [*(factor * value.gain for factor in scale), 1.0]
             data["bias"] = [*bias, 0.0]
@@ -155,8 +161,11 @@ class TextureStore:
         data: dict[str, Any] = {"image": self.image(value.source)}
         if sampling.space == "noise":
             numbers = zip(NOISE, sampling.matrix, strict=True)
-            return data | {"type": "noise", "place": sampling.uv, **dict(numbers)}
-        if sampling.uv:
+            place = self.json(sampling.at, "vector") if sampling.at else sampling.uv
+            return data | {"type": "noise", "place": place, **dict(numbers)}
+        if sampling.at:
+            data["at"] = self.json(sampling.at, "vector")
+        elif sampling.uv:
             self.uvs.add(sampling.uv)
         return data | {
             "type": "image",

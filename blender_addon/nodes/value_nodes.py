@@ -9,9 +9,10 @@ import bpy
 import numpy as np
 
 from . import operators
-from .coordinates import coordinates, equirectangular
+from .coordinates import AS_IT_IS, Coordinates, equirectangular
 from .curves import float_curve, rgb_curves
 from .patterns import checker, gradient, noise, wave
+from .places import given, looked_up, mapped
 from .tree import Stack, is_linked
 from .values import (
     KINDS,
@@ -68,21 +69,24 @@ def _image(
         return Constant.number(1.0) if alpha else Constant.color((1.0, 0.0, 1.0))
     if node.projection not in {"FLAT", "EQUIRECTANGULAR"}:
         raise UnsupportedError(f"the {node.projection.lower().replace('_', ' ')} projection")
-    place = coordinates(node.inputs["Vector"], stack, ev.value, world=ev.world)
-    if environment != (place.space == "environment"):
+    place = looked_up(ev, node, stack, "uv")
+    if environment != (isinstance(place, Coordinates) and place.space == "environment"):
         raise UnsupportedError("a texture of this kind in this place")
-    uv, transform = ("", ()) if environment else ev.textures.place(place)
     if node.interpolation in {"Cubic", "Smart"}:
         ev.warn(node, f"{node.interpolation.lower()} interpolation", "linear is used")
     straight = not environment and is_linked(node.outputs["Alpha"])
     texture_filter = "closest" if node.interpolation == "Closest" else "linear"
     source = ev.textures.source(node.image, straight_alpha=straight)
-    if environment and place.point() is not None:
+    wrap = _WRAP[node.extension]
+    if not isinstance(place, Coordinates):
+        sampling = Sampling("uv", AS_IT_IS, "", wrap, texture_filter, at=place)
+    elif not environment:
+        uv, transform = ev.textures.place(place)
+        sampling = Sampling("uv", transform, uv, wrap, texture_filter)
+    elif place.point() is not None:
         return pick(source, *equirectangular(place.point()), texture_filter)
-    if environment:
-        sampling = Sampling("environment", place.direction_matrix(), filter=texture_filter)
     else:
-        sampling = Sampling("uv", transform, uv, _WRAP[node.extension], texture_filter)
+        sampling = Sampling("environment", place.direction_matrix(), filter=texture_filter)
     return ImageValue(source, sampling, "float" if alpha else "color", "a" if alpha else "rgb")
 
 
@@ -284,6 +288,9 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeTexNoise": noise,
     "ShaderNodeTexWave": wave,
     "ShaderNodeAttribute": _attribute,
+    "ShaderNodeTexCoord": given,
+    "ShaderNodeUVMap": given,
+    "ShaderNodeMapping": mapped,
     "ShaderNodeMath": _math,
     "ShaderNodeVectorMath": _vector_math,
     "ShaderNodeMix": _mix,

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .coordinates import Coordinates
 
 Kind = Literal["float", "color", "vector"]
 
@@ -85,7 +88,7 @@ class Sampling:
 
     `matrix`: for "uv" the six numbers of the ABI's texture transform, for "environment" the nine of
     a 3x3 matrix applied to the direction, for "noise" what its strength depends on; then `uv` is
-    the attribute that says where.
+    the attribute that says where. `at`: what stands for the UV map or the attribute instead.
     """
 
     space: Literal["uv", "environment", "noise"]
@@ -93,6 +96,7 @@ class Sampling:
     uv: str = ""
     wrap: str = "repeat"
     filter: str = "linear"
+    at: Value | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +131,15 @@ class AttributeValue:
 
 
 @dataclass(frozen=True, eq=False)
+class PlaceValue:
+    """Texture coordinates as three numbers."""
+
+    place: Coordinates
+    kind: Kind = "vector"
+    channel: str = "rgb"
+
+
+@dataclass(frozen=True, eq=False)
 class Composed:
     """A function of other values, none of them constant, component by component.
 
@@ -151,13 +164,25 @@ class Composed:
     @property
     def lookups(self) -> int:
         """How many textures are looked up for it, itself included."""
-        return 1 + sum(value.lookups if isinstance(value, Composed) else 1 for value in self.of)
+        return 1 + sum(map(lookups, self.of))
 
 
-Value = Constant | ImageValue | AttributeValue | Composed
+Value = Constant | ImageValue | AttributeValue | PlaceValue | Composed
 
 # What the ABI allows.
 _MOST_LOOKUPS = 256
+
+# Between which numbers coordinates are expected that have no bounds of their own.
+_FAR = 16.0
+
+
+def lookups(value: Value) -> int:
+    """How many textures are looked up for a value."""
+    if isinstance(value, Composed):
+        return value.lookups
+    if isinstance(value, ImageValue) and value.sampling.at is not None:
+        return 1 + lookups(value.sampling.at)
+    return 1
 
 
 @dataclass(eq=False)
@@ -211,7 +236,7 @@ def array(value: Value) -> np.ndarray:
         return np.array(value.rgb[:width], np.float32).reshape(1, 1, width)
     if isinstance(value, AttributeValue):
         raise UnsupportedError("arithmetic on a mesh attribute")
-    if isinstance(value, Composed):
+    if isinstance(value, PlaceValue | Composed):
         raise UnsupportedError("arithmetic on several textures")
     texels = value.source.texels()
     if value.gain != 1.0:
@@ -236,6 +261,8 @@ def average(value: Value) -> Constant:
         return value
     if isinstance(value, AttributeValue):
         return Constant((1.0, 1.0, 1.0), value.kind)
+    if isinstance(value, PlaceValue):
+        return Constant((float(np.mean(bounds(value))),) * 3, value.kind)
     if isinstance(value, Composed):
         return _average_of_composed(value)
     mean = array(value).mean(axis=(0, 1))
@@ -282,15 +309,18 @@ def bounds(value: Value) -> tuple[float, float]:
         return min(value.rgb), max(value.rgb)
     if isinstance(value, AttributeValue):
         return 0.0, 1.0
+    if isinstance(value, PlaceValue):
+        return (0.0, 1.0) if value.place.space == "generated" else (-_FAR, _FAR)
     if isinstance(value, Composed):
         return value.reach
     ends = [value.gain * end for end in value.source.reach()]
     return min(ends), max(ends)
 
 
-def component(value: ImageValue | AttributeValue | Composed, index: int) -> Value:
-    """A component of a colour or vector that is read as such."""
-    return replace(value, kind="float", channel="rgb"[index])
+def component(value: ImageValue | AttributeValue | PlaceValue | Composed, index: int) -> Value:
+    """A component of a colour or vector."""
+    channel = "rgb"[index] if value.channel == "rgb" else value.channel
+    return replace(value, kind="float", channel=channel)
 
 
 def _affine(
@@ -303,7 +333,8 @@ def _affine(
     attributes = [value for value in values if isinstance(value, AttributeValue)]
     first = attributes[0]
     if any(
-        isinstance(value, ImageValue | Composed) or getattr(value, "channel", "") == "a"
+        isinstance(value, ImageValue | PlaceValue | Composed)
+        or getattr(value, "channel", "") == "a"
         for value in values
     ):
         raise UnsupportedError("arithmetic on a mesh attribute")

@@ -98,8 +98,12 @@ impl Table {
 
 /// How many textures and constants a texture looks up, itself included.
 fn lookups(texture: &Texture, all: &[Texture]) -> usize {
-    let (Texture::Multilinear(Multilinear { of, .. }) | Texture::Table(Table { of, .. })) = texture else {
-        return 1;
+    let of = match texture {
+        Texture::Multilinear(t) => t.of.as_slice(),
+        Texture::Table(t) => t.of.as_slice(),
+        Texture::Image(t) => t.at.as_slice(),
+        Texture::Noise(t) => t.place.value().map(std::slice::from_ref).unwrap_or_default(),
+        Texture::Constant(_) | Texture::Attribute { .. } => &[],
     };
     let of_value = |v: &Value| match v {
         Value::Constant(_) => 1,
@@ -109,7 +113,7 @@ fn lookups(texture: &Texture, all: &[Texture]) -> usize {
 }
 
 /// Checks what a texture is made of: all of that was there before it, so that none is made of itself.
-fn check(of: &[Value], name: &str, before: &[Texture]) -> Result<(), SceneError> {
+pub(super) fn check(of: &[Value], name: &str, before: &[Texture]) -> Result<(), SceneError> {
     let fail = |problem: String| Err(SceneError::new(format!("texture {name:?}"), problem));
     if !(1..=3).contains(&of.len()) {
         return fail(format!("it is made of one to three values, not of {}", of.len()));

@@ -1,6 +1,7 @@
 //! Textures: where a material's values come from when they are not constant.
 
-use super::composition::{Multilinear, MultilinearJson, Table, TableJson};
+use super::composition::{self, Multilinear, MultilinearJson, Table, TableJson};
+use super::value::Value;
 use super::{Image, SceneError};
 use crate::math::noise::Fractal;
 use glam::{Affine2, Mat2, Vec2, Vec4};
@@ -40,6 +41,8 @@ pub struct ImageTexture {
     pub image: u32,
     /// Name of the UV attribute; empty is the mesh's first one.
     pub uv: String,
+    /// What stands for its coordinates instead, the first two components of it.
+    pub at: Option<Value>,
     /// UV to picture coordinates, (0,0) at the bottom left.
     pub transform: Affine2,
     /// Wrap along s and t.
@@ -52,11 +55,31 @@ pub struct ImageTexture {
     pub bias: Vec4,
 }
 
-/// Noise by a place that the mesh has as a colour attribute, and what it is shown as.
+/// Where noise is looked up.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+pub enum Place {
+    /// Where a colour attribute of this name says; where a mesh has none, all is at the origin.
+    Attribute(String),
+    /// Where a value says.
+    Value(Value),
+}
+
+impl Place {
+    /// The value, if it is one.
+    pub fn value(&self) -> Option<&Value> {
+        match self {
+            Self::Attribute(_) => None,
+            Self::Value(v) => Some(v),
+        }
+    }
+}
+
+/// Noise by a place, and what it is shown as.
 #[derive(Clone, Debug)]
 pub struct NoiseTexture {
-    /// Name of the attribute; where a mesh has none, all is at its origin.
-    pub place: String,
+    /// The place.
+    pub place: Place,
     /// The noise.
     pub noise: Fractal,
     /// Index of the image whose upper row has the values from 0 to 1, from left to right.
@@ -99,6 +122,8 @@ enum Json {
         image: u32,
         #[serde(default)]
         uv: String,
+        #[serde(default)]
+        at: Option<Value>,
         #[serde(default = "identity")]
         transform: [f32; 6],
         #[serde(default)]
@@ -113,7 +138,7 @@ enum Json {
         bias: [f32; 4],
     },
     Noise {
-        place: String,
+        place: Place,
         image: u32,
         #[serde(default)]
         detail: f32,
@@ -177,15 +202,19 @@ impl Texture {
                 finite("value", &value)?;
                 Ok(Self::Constant(value.into()))
             }
-            Json::Image { image, uv, transform, wrap_s, wrap_t, filter, scale, bias } => {
+            Json::Image { image, uv, at, transform, wrap_s, wrap_t, filter, scale, bias } => {
                 exists(image)?;
                 finite("transform", &transform)?;
                 finite("scale", &scale)?;
                 finite("bias", &bias)?;
+                if let Some(at) = &at {
+                    composition::check(std::slice::from_ref(at), name, before)?;
+                }
                 let [a, b, c, d, e, f] = transform;
                 Ok(Self::Image(Box::new(ImageTexture {
                     image,
                     uv,
+                    at,
                     transform: Affine2::from_mat2_translation(
                         Mat2::from_cols(Vec2::new(a, d), Vec2::new(b, e)),
                         Vec2::new(c, f),
@@ -198,8 +227,12 @@ impl Texture {
             }
             Json::Noise { place, image, detail, roughness, lacunarity, distortion, scale, bias } => {
                 exists(image)?;
-                if place.is_empty() {
-                    return Err(fail("place names no attribute".into()));
+                match &place {
+                    Place::Attribute(of) if of.is_empty() => {
+                        return Err(fail("place names no attribute".into()));
+                    }
+                    Place::Attribute(_) => {}
+                    Place::Value(v) => composition::check(std::slice::from_ref(v), name, before)?,
                 }
                 finite("noise", &[detail, roughness, lacunarity, distortion])?;
                 finite("scale", &scale)?;

@@ -2,7 +2,7 @@
 
 use crate::math::luminance;
 use crate::scene::mesh::Attribute;
-use crate::scene::texture::{ImageTexture, NoiseTexture, Reconstruction, Texture, Wrap};
+use crate::scene::texture::{ImageTexture, NoiseTexture, Place, Reconstruction, Texture, Wrap};
 use crate::scene::value::{Channel, Value};
 use crate::scene::{Image, Mesh, Scene};
 use glam::{Vec2, Vec3, Vec4};
@@ -53,7 +53,7 @@ impl TextureSet {
             .filter_map(|t| match t {
                 Texture::Constant(_) | Texture::Multilinear(_) | Texture::Table(_) => None,
                 Texture::Image(t) => Some(t.uv.as_str()),
-                Texture::Noise(t) => Some(t.place.as_str()),
+                Texture::Noise(t) => attribute_of(&t.place),
                 Texture::Attribute { name, .. } => Some(name.as_str()),
             })
             .collect();
@@ -68,7 +68,7 @@ impl TextureSet {
             .map(|t| match t {
                 Texture::Constant(_) | Texture::Multilinear(_) | Texture::Table(_) => FIRST,
                 Texture::Image(t) => number(&t.uv),
-                Texture::Noise(t) => number(&t.place),
+                Texture::Noise(t) => attribute_of(&t.place).map_or(FIRST, number),
                 Texture::Attribute { name, .. } => number(name),
             })
             .collect();
@@ -83,11 +83,14 @@ impl TextureSet {
         match &self.scene.textures[texture as usize] {
             Texture::Constant(v) => *v,
             Texture::Image(t) => {
-                let uv = self.uv(texture, at).unwrap_or(Vec2::ZERO);
+                let uv = match &t.at {
+                    Some(place) => self.color(place, at).truncate(),
+                    None => self.uv(texture, at).unwrap_or(Vec2::ZERO),
+                };
                 let image = &self.scene.images[t.image as usize];
                 sample(image, t, t.transform.transform_point2(uv)) * t.scale + t.bias
             }
-            Texture::Noise(t) => self.noise(t, self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate()),
+            Texture::Noise(t) => self.noise(t, self.place(texture, t, at)),
             Texture::Attribute { default, .. } => self.attribute(texture, at).unwrap_or(*default),
             Texture::Multilinear(t) => self.multilinear(t, at).extend(1.0),
             Texture::Table(t) => self.table(t, at).extend(1.0),
@@ -99,6 +102,14 @@ impl TextureSet {
         let mesh = &self.scene.meshes[at.mesh as usize];
         let i = index(&self.color_names[at.mesh as usize], self.texture_names[texture as usize])?;
         Some(interpolate(&mesh.colors[i].1, mesh, at))
+    }
+
+    /// Where noise is looked up.
+    fn place(&self, texture: u32, t: &NoiseTexture, at: &MeshPoint) -> Vec3 {
+        match t.place.value() {
+            Some(v) => self.color(v, at),
+            None => self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate(),
+        }
     }
 
     fn noise(&self, t: &NoiseTexture, place: Vec3) -> Vec4 {
@@ -135,19 +146,13 @@ impl TextureSet {
     /// The same of a colour.
     pub(super) fn color_slopes(&self, value: &Value, at: &MeshPoint) -> [Vec3; 2] {
         let Value::Texture { texture, channel } = *value else { return [Vec3::ZERO; 2] };
-        let mesh = &self.scene.meshes[at.mesh as usize];
-        let vertices = mesh.triangles[at.triangle as usize];
         let slopes = match &self.scene.textures[texture as usize] {
             Texture::Constant(_) => [Vec4::ZERO; 2],
             Texture::Image(t) => {
-                let names = (&self.uv_names[at.mesh as usize], self.texture_names[texture as usize]);
-                let Some(set) = index(names.0, names.1) else { return [Vec3::ZERO; 2] };
-                let Ok([a, b, c]) = mesh.uvs[set].1.corners(at.triangle as usize, vertices) else {
-                    return [Vec3::ZERO; 2];
-                };
+                let Some((uv, edges)) = self.uv_slopes(texture, t, at) else { return [Vec3::ZERO; 2] };
                 let image = &self.scene.images[t.image as usize];
                 let size = Vec2::new(image.width() as f32, image.height() as f32);
-                let st = t.transform.transform_point2(interpolate(&mesh.uvs[set].1, mesh, at));
+                let st = t.transform.transform_point2(uv);
                 let across = |texel: Vec2| {
                     let d = 0.5 * texel / size;
                     (sample(image, t, st + d) - sample(image, t, st - d)) * t.scale
@@ -157,12 +162,17 @@ impl TextureSet {
                     let edge = t.transform.transform_vector2(edge);
                     ds * edge.x + dt * edge.y
                 };
-                [along(b - a), along(c - a)]
+                edges.map(along)
             }
             Texture::Noise(t) => {
-                let place = self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate();
-                let corner = |u, v| self.attribute(texture, &at.moved(u, v)).unwrap_or(Vec4::ZERO).truncate();
-                let first = corner(0.0, 0.0);
+                let place = self.place(texture, t, at);
+                let edges = match t.place.value() {
+                    Some(v) => self.color_slopes(v, at),
+                    None => {
+                        let corner = |u, v| self.place(texture, t, &at.moved(u, v));
+                        [corner(1.0, 0.0), corner(0.0, 1.0)].map(|end| end - corner(0.0, 0.0))
+                    }
+                };
                 let along = |edge: Vec3| {
                     let length = edge.length();
                     let step = 0.5 * FINE * t.noise.finest();
@@ -170,7 +180,7 @@ impl TextureSet {
                     let rise = self.noise(t, place + d) - self.noise(t, place - d);
                     if length > 0.0 { rise * (length / (2.0 * step)) } else { Vec4::ZERO }
                 };
-                [along(corner(1.0, 0.0) - first), along(corner(0.0, 1.0) - first)]
+                edges.map(along)
             }
             Texture::Attribute { .. } => {
                 let corner = |u, v| self.lookup(texture, &at.moved(u, v));
@@ -183,6 +193,20 @@ impl TextureSet {
         slopes.map(|s| part(channel, s))
     }
 
+    /// The coordinates of an image before its transform, and their slopes along the edges of the triangle.
+    fn uv_slopes(&self, texture: u32, t: &ImageTexture, at: &MeshPoint) -> Option<(Vec2, [Vec2; 2])> {
+        if let Some(place) = &t.at {
+            let edges = self.color_slopes(place, at).map(|edge| edge.truncate());
+            return Some((self.color(place, at).truncate(), edges));
+        }
+        let mesh = &self.scene.meshes[at.mesh as usize];
+        let set = index(&self.uv_names[at.mesh as usize], self.texture_names[texture as usize])?;
+        let map = &mesh.uvs[set].1;
+        let vertices = mesh.triangles[at.triangle as usize];
+        let [a, b, c] = map.corners(at.triangle as usize, vertices).ok()?;
+        Some((interpolate(map, mesh, at), [b - a, c - a]))
+    }
+
     /// Index in the mesh's list of the UV set that `name` (of a normal map) means.
     pub fn uv_set(&self, name: &str, mesh: u32) -> Option<usize> {
         self.scene.meshes[mesh as usize].uv_index(name)
@@ -192,6 +216,14 @@ impl TextureSet {
         let mesh = &self.scene.meshes[at.mesh as usize];
         let i = index(&self.uv_names[at.mesh as usize], self.texture_names[texture as usize])?;
         Some(interpolate(&mesh.uvs[i].1, mesh, at))
+    }
+}
+
+/// The attribute by which a place is told.
+fn attribute_of(place: &Place) -> Option<&str> {
+    match place {
+        Place::Attribute(name) => Some(name),
+        Place::Value(_) => None,
     }
 }
 
@@ -294,6 +326,7 @@ mod tests {
         ImageTexture {
             image: 0,
             uv: String::new(),
+            at: None,
             transform: Affine2::IDENTITY,
             wrap: [mode; 2],
             filter,

@@ -407,6 +407,45 @@ def case_textures_of_several() -> None:
         _check_floor(made.__name__ if made else "bumps")
 
 
+def _bent(tree: bpy.types.NodeTree, space: str) -> bpy.types.NodeSocket:
+    """Coordinates that noise bends, and that are turned and scaled then."""
+    place, noise = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexNoise")
+    bend, turn = tree.nodes.new("ShaderNodeVectorMath"), tree.nodes.new("ShaderNodeMapping")
+    noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = 1.5, 0.0
+    bend.operation = "MULTIPLY_ADD"
+    bend.inputs[1].default_value = (0.5, 0.4, 0.3)
+    turn.inputs["Rotation"].default_value = (0.2, 0, 0.4)
+    turn.inputs["Scale"].default_value = (1.5, 1, 1)
+    tree.links.new(place.outputs[space], noise.inputs["Vector"])
+    tree.links.new(noise.outputs[0], bend.inputs[0])
+    tree.links.new(place.outputs[space], bend.inputs[2])
+    tree.links.new(bend.outputs[0], turn.inputs["Vector"])
+    return turn.outputs[0]
+
+
+def case_coordinates_that_are_computed() -> None:
+    """Bent ones for pictures and patterns, and single ones as numbers."""
+    pixels = np.ones((8, 8, 4), np.float32)
+    pixels[..., :3] = np.random.default_rng(2).random((8, 8, 3))
+    for kind, space in (
+        ("TexImage", "UV"),
+        ("TexNoise", "Object"),
+        ("TexWave", "Generated"),
+        ("SeparateXYZ", "Generated"),
+    ):
+        tree, texture, diffuse = _floor_of(kind, "")
+        tree.links.new(_bent(tree, space), texture.inputs["Vector"])
+        if kind == "TexImage":
+            texture.image = builders.image("Patches", pixels, "Non-Color", is_float=True)
+            tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
+        else:
+            if kind != "SeparateXYZ":
+                texture.inputs["Scale"].default_value = 1.0
+            _through_ramp(tree, texture, diffuse, 0.2, 0.8)
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        _check_floor(kind, space)
+
+
 def case_gradients_and_waves() -> None:
     """Through a colour ramp, on floor and ball."""
     for kind, properties, scale, space in (

@@ -1,0 +1,68 @@
+"""Texture coordinates as values: where they are computed with, and where textures are looked up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from .coordinates import Coordinates, coordinates, mapping, origin
+from .tree import Source, Stack, resolve
+from .values import Constant, PlaceValue, UnsupportedError, Value, component, lookups
+
+if TYPE_CHECKING:
+    from .evaluate import Evaluator
+
+# Textures that may be looked up for a place: what is looked up there has room for some more.
+_MOST_LOOKUPS = 128
+
+
+def given(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
+    """Texture Coordinate and UV Map."""
+    if ev.world:
+        raise UnsupportedError(f"the output '{output.name}'")
+    space, uv = origin(Source(stack, node=node, output=output), world=False)
+    return PlaceValue(Coordinates(space, uv, np.eye(4)))
+
+
+def mapped(
+    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+) -> Value:
+    """Mapping, of what is more than texture coordinates."""
+    return turned(ev, node, ev.value(node.inputs["Vector"], stack), mapping(node, stack, ev.value))
+
+
+def turned(ev: Evaluator, node: bpy.types.Node, vector: Value, matrix: np.ndarray) -> Value:
+    """A vector by a 4x4 matrix."""
+    if isinstance(vector, Constant):
+        return Constant.vector(matrix[:3, :3] @ vector.rgb + matrix[:3, 3])
+
+    def apply(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return np.concatenate([x, y, z], axis=-1) @ matrix[:3, :3].T + matrix[:3, 3]
+
+    return ev.combine(node, "vector", apply, *(component(vector, index) for index in range(3)))
+
+
+def looked_up(
+    ev: Evaluator, node: bpy.types.Node, stack: Stack, default: str
+) -> Coordinates | Value:
+    """Where a texture is looked up: at coordinates, or wherever a vector says.
+
+    `default`: the coordinates where nothing arrives.
+    """
+    entry = node.inputs["Vector"]
+    try:
+        return coordinates(entry, stack, ev.value, world=ev.world, default=default)
+    except UnsupportedError as reason:
+        if ev.world or not _is_computed(resolve(entry, stack)):
+            raise
+        vector = ev.value(entry, stack)
+        if isinstance(vector, Constant) or lookups(vector) > _MOST_LOOKUPS:
+            raise reason from None
+        return vector
+
+
+def _is_computed(source: Source) -> bool:
+    """Whether a vector comes from a node that computes it from others."""
+    return source.node is not None and any(entry.enabled for entry in source.node.inputs)
