@@ -77,12 +77,13 @@ def _image(
     straight = not environment and is_linked(node.outputs["Alpha"])
     texture_filter = "closest" if node.interpolation == "Closest" else "linear"
     source = ev.textures.source(node.image, straight_alpha=straight)
-    wrap = _WRAP[node.extension]
-    if not isinstance(place, Coordinates):
-        sampling = Sampling("uv", AS_IT_IS, "", wrap, texture_filter, at=place)
-    elif not environment:
-        uv, transform = ev.textures.place(place)
-        sampling = Sampling("uv", transform, uv, wrap, texture_filter)
+    if not environment:
+        wrap = _WRAP[node.extension]
+        if isinstance(place, Coordinates):
+            uv, transform = ev.textures.place(place)
+            sampling = Sampling("uv", transform, uv, wrap, texture_filter)
+        else:
+            sampling = Sampling("uv", AS_IT_IS, "", wrap, texture_filter, at=place)
     elif place.point() is not None:
         return pick(source, *equirectangular(place.point()), texture_filter)
     else:
