@@ -127,25 +127,25 @@ def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stac
 
 
 def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Noise Texture in three dimensions; its colour is its factor in all channels."""
+    """Noise Texture in three dimensions."""
     if node.noise_dimensions != "3D":
         raise UnsupportedError(f"noise in {node.noise_dimensions}")
     if getattr(node, "noise_type", "FBM") != "FBM":
         raise UnsupportedError(f"{node.noise_type.lower().replace('_', ' ')} noise")
     if not getattr(node, "normalize", True):
         raise UnsupportedError("noise that is not normalized")
-    if output.identifier == "Color":
-        ev.simplify(node, "coloured noise", "grey noise is used")
     place = _place(ev, node, stack)
     scale = ev.number(node.inputs["Scale"], stack)
+    colored = output.identifier == "Color"
+    space = "colored noise" if colored else "noise"
     numbers = tuple(
         ev.number(node.inputs[name], stack)
         for name in ("Detail", "Roughness", "Lacunarity", "Distortion")
     )
     if isinstance(place, Coordinates):
-        sampling = Sampling("noise", numbers, ev.textures.solid(place.scaled(scale)), "clamp")
+        sampling = Sampling(space, numbers, ev.textures.solid(place.scaled(scale)), "clamp")
     else:
         scaled = turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
-        sampling = Sampling("noise", numbers, "", "clamp", at=scaled)
+        sampling = Sampling(space, numbers, "", "clamp", at=scaled)
     ramp = Baked("Noise", np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[None, :, None])
-    return _shown(ImageValue(ramp, sampling, "float", "r"), output)
+    return ImageValue(ramp, sampling, *(("color", "rgb") if colored else ("float", "r")))

@@ -159,10 +159,10 @@ class TextureStore:
         """A picture that is looked up by coordinates or by noise, as it is."""
         sampling = value.sampling
         data: dict[str, Any] = {"image": self.image(value.source)}
-        if sampling.space == "noise":
-            numbers = zip(NOISE, sampling.matrix, strict=True)
-            place = self.json(sampling.at, "vector") if sampling.at else sampling.uv
-            return data | {"type": "noise", "place": place, **dict(numbers)}
+        if sampling.space in {"noise", "colored noise"}:
+            data |= zip(NOISE, sampling.matrix, strict=True)
+            data["place"] = self.json(sampling.at, "vector") if sampling.at else sampling.uv
+            return data | {"type": "noise", "colored": sampling.space == "colored noise"}
         if sampling.at:
             data["at"] = self.json(sampling.at, "vector")
         elif sampling.uv:

@@ -87,11 +87,12 @@ class Sampling:
     """How an image is looked up.
 
     `matrix`: for "uv" the six numbers of the ABI's texture transform, for "environment" the nine of
-    a 3x3 matrix applied to the direction, for "noise" what its strength depends on; then `uv` is
-    the attribute that says where. `at`: what stands for the UV map or the attribute instead.
+    a 3x3 matrix applied to the direction, for noise what its strength depends on; then `uv` is the
+    attribute that says where, and each component of "colored noise" has its own. `at`: what stands
+    for the UV map or the attribute instead.
     """
 
-    space: Literal["uv", "environment", "noise"]
+    space: Literal["uv", "environment", "noise", "colored noise"]
     matrix: tuple[float, ...]
     uv: str = ""
     wrap: str = "repeat"
@@ -238,6 +239,8 @@ def array(value: Value) -> np.ndarray:
         raise UnsupportedError("arithmetic on a mesh attribute")
     if isinstance(value, PlaceValue | Composed):
         raise UnsupportedError("arithmetic on several textures")
+    if value.sampling.space == "colored noise":
+        raise UnsupportedError("arithmetic on coloured noise")
     texels = value.source.texels()
     if value.gain != 1.0:
         texels = texels * np.float32(value.gain)
@@ -265,6 +268,8 @@ def average(value: Value) -> Constant:
         return Constant((float(np.mean(bounds(value))),) * 3, value.kind)
     if isinstance(value, Composed):
         return _average_of_composed(value)
+    if value.sampling.space == "colored noise":
+        return Constant((float(np.mean(bounds(value))),) * 3, value.kind)
     mean = array(value).mean(axis=(0, 1))
     if value.kind == "float":
         return Constant.number(mean[0])

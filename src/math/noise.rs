@@ -76,10 +76,23 @@ pub fn noise(p: Vec3) -> f32 {
 impl Fractal {
     /// Its value at a place, about in [0, 1].
     pub fn at(&self, p: Vec3) -> f32 {
-        let mut p = p;
-        if self.distortion != 0.0 {
-            p += self.distortion * Vec3::from([0, 1, 2].map(|k| noise(p + offset(k))));
+        self.octaves(self.distorted(p))
+    }
+
+    /// Three values at a place, of which the first is [`Self::at`].
+    pub fn color_at(&self, p: Vec3) -> Vec3 {
+        let p = self.distorted(p);
+        Vec3::new(self.octaves(p), self.octaves(p + offset(3)), self.octaves(p + offset(4)))
+    }
+
+    fn distorted(&self, p: Vec3) -> Vec3 {
+        if self.distortion == 0.0 {
+            return p;
         }
+        p + self.distortion * Vec3::from([0, 1, 2].map(|k| noise(p + offset(k))))
+    }
+
+    fn octaves(&self, p: Vec3) -> f32 {
         let (mut frequency, mut amplitude, mut most, mut sum) = (1.0, 1.0, 0.0, 0.0);
         for _ in 0..=self.detail as u32 {
             sum += noise(p * frequency) * amplitude;
@@ -103,7 +116,7 @@ impl Fractal {
     }
 }
 
-/// Where the noise of number `k` that moves places is taken from, far from the others.
+/// Where the noise of number `k` is taken from, far from the others: that which moves places, and further colours.
 fn offset(k: u32) -> Vec3 {
     Vec3::from([0, 1, 2].map(|axis| 100.0 + 100.0 * unit(k, axis)))
 }

@@ -82,6 +82,8 @@ pub struct NoiseTexture {
     pub place: Place,
     /// The noise.
     pub noise: Fractal,
+    /// Whether the three components have noise of their own.
+    pub colored: bool,
     /// Index of the image whose upper row has the values from 0 to 1, from left to right.
     pub image: u32,
     /// Factor of the image's value.
@@ -148,6 +150,8 @@ enum Json {
         lacunarity: f32,
         #[serde(default)]
         distortion: f32,
+        #[serde(default)]
+        colored: bool,
         #[serde(default = "ones")]
         scale: [f32; 4],
         #[serde(default)]
@@ -225,7 +229,7 @@ impl Texture {
                     bias: bias.into(),
                 })))
             }
-            Json::Noise { place, image, detail, roughness, lacunarity, distortion, scale, bias } => {
+            Json::Noise { place, image, detail, roughness, lacunarity, distortion, colored, scale, bias } => {
                 exists(image)?;
                 match &place {
                     Place::Attribute(of) if of.is_empty() => {
@@ -241,7 +245,7 @@ impl Texture {
                 let roughness = roughness.max(0.0);
                 let noise = Fractal { detail, roughness, lacunarity, distortion };
                 let (scale, bias) = (scale.into(), bias.into());
-                Ok(Self::Noise(Box::new(NoiseTexture { place, noise, image, scale, bias })))
+                Ok(Self::Noise(Box::new(NoiseTexture { place, noise, colored, image, scale, bias })))
             }
             Json::Attribute { name: attribute, default } => {
                 finite("default", &default)?;

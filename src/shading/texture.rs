@@ -115,10 +115,19 @@ impl TextureSet {
     fn noise(&self, t: &NoiseTexture, place: Vec3) -> Vec4 {
         let image = &self.scene.images[t.image as usize];
         let last = image.width() - 1;
-        let x = t.noise.at(place).clamp(0.0, 1.0) * last as f32;
-        let left = (x as u32).min(last.saturating_sub(1));
-        let (a, b) = (image.texel(left, 0), image.texel((left + 1).min(last), 0));
-        a.lerp(b, x - left as f32) * t.scale + t.bias
+        let shown = |strength: f32| {
+            let x = strength.clamp(0.0, 1.0) * last as f32;
+            let left = (x as u32).min(last.saturating_sub(1));
+            let (a, b) = (image.texel(left, 0), image.texel((left + 1).min(last), 0));
+            a.lerp(b, x - left as f32)
+        };
+        let value = if t.colored {
+            let [r, g, b] = t.noise.color_at(place).to_array().map(shown);
+            Vec4::new(r.x, g.y, b.z, r.w)
+        } else {
+            shown(t.noise.at(place))
+        };
+        value * t.scale + t.bias
     }
 
     /// A parameter as a colour.

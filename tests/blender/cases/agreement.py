@@ -315,6 +315,28 @@ def case_checkers_and_pictures_by_other_coordinates() -> None:
         _check_floor(space, kind)
 
 
+def case_coloured_noise() -> None:
+    """Plain, of another hue, and by coordinates that it bends itself."""
+    for use in ("plain", "hue", "bend"):
+        tree, noise, diffuse = _floor_of("TexNoise", "Object")
+        noise.inputs["Scale"].default_value, noise.inputs["Distortion"].default_value = 2.0, 0.3
+        last = noise
+        if use == "hue":
+            last = tree.nodes.new("ShaderNodeHueSaturation")
+            last.inputs["Hue"].default_value, last.inputs["Saturation"].default_value = 0.7, 1.5
+            tree.links.new(noise.outputs["Color"], last.inputs["Color"])
+        elif use == "bend":
+            last, bend = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeMixRGB")
+            last.inputs["Scale"].default_value, last.inputs["Detail"].default_value = 3.0, 1.0
+            place = tree.nodes.new("ShaderNodeTexCoord")
+            tree.links.new(place.outputs["Object"], bend.inputs["Color1"])
+            tree.links.new(noise.outputs["Color"], bend.inputs["Color2"])
+            tree.links.new(bend.outputs["Color"], last.inputs["Vector"])
+        tree.links.new(last.outputs["Color"], diffuse.inputs["Color"])
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        _check_floor(use)
+
+
 def case_noise() -> None:
     """As colour through a ramp and as bumps, on floor and ball."""
     for inputs, space, as_bumps in (

@@ -168,7 +168,6 @@ def case_patterns_without_a_counterpart_are_named() -> None:
         ("TexGradient", {"gradient_type": "SPHERICAL"}, {}),
         ("TexWave", {"wave_type": "RINGS"}, {}),
         ("TexWave", {}, {"Distortion": 2.0}),
-        ("TexNoise", {}, {}),
         ("TexNoise", {"noise_dimensions": "4D"}, {}),
         ("TexVoronoi", {}, {}),
     ):
