@@ -10,7 +10,7 @@ import bpy
 from .evaluate import Evaluator
 from .fresnel import fresnel_ior, layered
 from .tree import Stack, is_linked, resolve, socket
-from .values import KINDS, AttributeValue, Constant, PlaceValue, Value, bounds, convert
+from .values import KINDS, Composed, Constant, ImageValue, Value, bounds, convert
 
 Closure = dict[str, Any]
 
@@ -322,11 +322,8 @@ class ClosureTranslator:
         value = self.ev.value(node.inputs["Color"], stack)
         if isinstance(value, Constant):
             return None
-        if (
-            space is None
-            or isinstance(value, AttributeValue | PlaceValue)
-            or value.channel != "rgb"
-        ):
+        is_scaled = isinstance(value, ImageValue | Composed)
+        if space is None or not is_scaled or value.channel != "rgb":
             self.ev.warn(node, "a normal map of this kind", "the surface's own normal is used")
             return None
         # DirectX's green points down; the choice is new in Blender 5.1.

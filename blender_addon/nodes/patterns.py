@@ -10,7 +10,16 @@ import numpy as np
 from .coordinates import AS_IT_IS, Coordinates
 from .places import looked_up, turned
 from .tree import Stack
-from .values import Baked, Constant, ImageValue, Sampling, UnsupportedError, Value, convert
+from .values import (
+    Baked,
+    Constant,
+    ImageValue,
+    PatternValue,
+    Sampling,
+    UnsupportedError,
+    Value,
+    convert,
+)
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator
@@ -124,6 +133,60 @@ def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stac
     values = _PROFILES[node.wave_profile]((np.arange(_SIZE) + 0.5) / _SIZE)
     place = _place(ev, node, stack)
     return _shown(_row(ev, node, place, turns @ steps, values, "repeat"), output)
+
+
+# What Blender's names of Voronoi features are, and how far each distance reaches, about, in cells.
+_FEATURES = {
+    "F1": ("f1", 1.5),
+    "F2": ("f2", 2.0),
+    "SMOOTH_F1": ("smooth_f1", 1.5),
+    "DISTANCE_TO_EDGE": ("distance_to_edge", 1.0),
+}
+
+# Inputs of Voronoi Texture; each feature and metric has those that it needs.
+_CELL_INPUTS = ("Detail", "Roughness", "Lacunarity", "Smoothness", "Exponent", "Randomness")
+
+
+def voronoi(
+    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+) -> Value:
+    """Voronoi Texture in three dimensions: distances and colours."""
+    if node.voronoi_dimensions != "3D":
+        raise UnsupportedError(f"cells in {node.voronoi_dimensions}")
+    if node.feature not in _FEATURES or output.identifier not in {"Distance", "Color"}:
+        raise UnsupportedError(f"the output '{output.name}'")
+    feature, reach = _FEATURES[node.feature]
+    entries = {name: node.inputs.get(name) for name in _CELL_INPUTS}
+    numbers = {
+        name.lower(): ev.number(entry, stack)
+        for name, entry in entries.items()
+        if entry is not None and entry.enabled
+    }
+    if feature == "distance_to_edge" and numbers.get("detail", 0.0) != 0.0:
+        ev.simplify(node, "detail of edges", "it is left out")
+    colored = output.identifier == "Color"
+    normalized = bool(getattr(node, "normalize", False))
+    octaves = 1.0 + numbers.get("detail", 0.0)
+    data = {
+        "type": "cells",
+        "colored": colored,
+        "cells": {
+            "feature": feature,
+            "metric": node.distance.lower(),
+            "normalize": normalized,
+            **numbers,
+        },
+    }
+    place = _place(ev, node, stack)
+    scale = ev.number(node.inputs["Scale"], stack)
+    where: str | Value
+    if isinstance(place, Coordinates):
+        where = ev.textures.solid(place.scaled(scale))
+    else:
+        where = turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
+    most = 1.0 if normalized else octaves if colored else reach * octaves
+    kind, channel = ("color", "rgb") if colored else ("float", "r")
+    return PatternValue("Voronoi", data, where, (0.0, most), kind, channel)
 
 
 def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:

@@ -21,7 +21,9 @@ from .values import (
     ImageSource,
     ImageValue,
     Kind,
+    PatternValue,
     PlaceValue,
+    Texture,
     UnsupportedError,
     Value,
 )
@@ -129,15 +131,24 @@ class TextureStore:
 
     def texture(
         self,
-        value: ImageValue | AttributeValue | PlaceValue | Composed,
+        value: Texture,
         scale: Sequence[float] = (1.0, 1.0, 1.0),
         bias: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> int:
-        """Id of the texture that yields `scale * value + bias`; an attribute is never scaled."""
+        """Id of the texture that yields `scale * value + bias`.
+
+        Attributes, places and patterns are never scaled.
+        """
         data: dict[str, Any]
         if isinstance(value, PlaceValue):
             name = self.solid(value.place)
             data = {"type": "attribute", "name": name, "default": [0.0, 0.0, 0.0, 1.0]}
+        elif isinstance(value, PatternValue):
+            name, place = value.name, value.place
+            data = {
+                **value.data,
+                "place": place if isinstance(place, str) else self.json(place, "vector"),
+            }
         elif isinstance(value, AttributeValue):
             name = self._reading(value)
             default = [*value.matrix[:, 3].tolist(), 1.0]

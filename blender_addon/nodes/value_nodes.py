@@ -11,7 +11,7 @@ import numpy as np
 from . import operators
 from .coordinates import AS_IT_IS, Coordinates, equirectangular
 from .curves import float_curve, rgb_curves
-from .patterns import checker, gradient, noise, wave
+from .patterns import checker, gradient, noise, voronoi, wave
 from .places import given, looked_up, mapped
 from .tree import Stack, is_linked
 from .values import (
@@ -287,6 +287,7 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeTexChecker": checker,
     "ShaderNodeTexGradient": gradient,
     "ShaderNodeTexNoise": noise,
+    "ShaderNodeTexVoronoi": voronoi,
     "ShaderNodeTexWave": wave,
     "ShaderNodeAttribute": _attribute,
     "ShaderNodeTexCoord": given,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -141,6 +141,21 @@ class PlaceValue:
 
 
 @dataclass(frozen=True, eq=False)
+class PatternValue:
+    """A pattern that is computed where it is looked up: keys of the ABI's texture but `place`.
+
+    `place`: an attribute or a value. `reach`: between what the pattern stays.
+    """
+
+    name: str
+    data: dict[str, Any]
+    place: str | Value
+    reach: tuple[float, float]
+    kind: Kind
+    channel: str
+
+
+@dataclass(frozen=True, eq=False)
 class Composed:
     """A function of other values, none of them constant, component by component.
 
@@ -168,7 +183,9 @@ class Composed:
         return 1 + sum(map(lookups, self.of))
 
 
-Value = Constant | ImageValue | AttributeValue | PlaceValue | Composed
+#: What is not the same everywhere.
+Texture = ImageValue | AttributeValue | PlaceValue | PatternValue | Composed
+Value = Constant | Texture
 
 # What the ABI allows.
 _MOST_LOOKUPS = 256
@@ -183,6 +200,8 @@ def lookups(value: Value) -> int:
         return value.lookups
     if isinstance(value, ImageValue) and value.sampling.at is not None:
         return 1 + lookups(value.sampling.at)
+    if isinstance(value, PatternValue) and not isinstance(value.place, str):
+        return 1 + lookups(value.place)
     return 1
 
 
@@ -237,7 +256,7 @@ def array(value: Value) -> np.ndarray:
         return np.array(value.rgb[:width], np.float32).reshape(1, 1, width)
     if isinstance(value, AttributeValue):
         raise UnsupportedError("arithmetic on a mesh attribute")
-    if isinstance(value, PlaceValue | Composed):
+    if isinstance(value, PlaceValue | PatternValue | Composed):
         raise UnsupportedError("arithmetic on several textures")
     if value.sampling.space == "colored noise":
         raise UnsupportedError("arithmetic on coloured noise")
@@ -264,7 +283,7 @@ def average(value: Value) -> Constant:
         return value
     if isinstance(value, AttributeValue):
         return Constant((1.0, 1.0, 1.0), value.kind)
-    if isinstance(value, PlaceValue):
+    if isinstance(value, PlaceValue | PatternValue):
         return Constant((float(np.mean(bounds(value))),) * 3, value.kind)
     if isinstance(value, Composed):
         return _average_of_composed(value)
@@ -316,13 +335,13 @@ def bounds(value: Value) -> tuple[float, float]:
         return 0.0, 1.0
     if isinstance(value, PlaceValue):
         return (0.0, 1.0) if value.place.space == "generated" else (-_FAR, _FAR)
-    if isinstance(value, Composed):
+    if isinstance(value, PatternValue | Composed):
         return value.reach
     ends = [value.gain * end for end in value.source.reach()]
     return min(ends), max(ends)
 
 
-def component(value: ImageValue | AttributeValue | PlaceValue | Composed, index: int) -> Value:
+def component(value: Texture, index: int) -> Value:
     """A component of a colour or vector."""
     channel = "rgb"[index] if value.channel == "rgb" else value.channel
     return replace(value, kind="float", channel=channel)
@@ -338,8 +357,7 @@ def _affine(
     attributes = [value for value in values if isinstance(value, AttributeValue)]
     first = attributes[0]
     if any(
-        isinstance(value, ImageValue | PlaceValue | Composed)
-        or getattr(value, "channel", "") == "a"
+        not isinstance(value, Constant | AttributeValue) or getattr(value, "channel", "") == "a"
         for value in values
     ):
         raise UnsupportedError("arithmetic on a mesh attribute")

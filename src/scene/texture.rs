@@ -3,6 +3,7 @@
 use super::composition::{self, Multilinear, MultilinearJson, Table, TableJson};
 use super::value::Value;
 use super::{Image, SceneError};
+use crate::math::cells::Cells;
 use crate::math::noise::Fractal;
 use glam::{Affine2, Mat2, Vec2, Vec4};
 use serde::Deserialize;
@@ -92,6 +93,20 @@ pub struct NoiseTexture {
     pub bias: Vec4,
 }
 
+/// Cellular noise by a place.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CellTexture {
+    /// The place.
+    pub place: Place,
+    /// The noise.
+    #[serde(default)]
+    pub cells: Cells,
+    /// Whether it is the cells' colours, instead of the distances.
+    #[serde(default)]
+    pub colored: bool,
+}
+
 /// A texture: a function of the surface point with an RGBA value.
 #[derive(Clone, Debug)]
 pub enum Texture {
@@ -101,6 +116,8 @@ pub enum Texture {
     Image(Box<ImageTexture>),
     /// Noise.
     Noise(Box<NoiseTexture>),
+    /// Cellular noise.
+    Cells(Box<CellTexture>),
     /// A colour attribute of the mesh, or `default` where the mesh has none of that name.
     Attribute {
         /// Name of the attribute.
@@ -157,6 +174,7 @@ enum Json {
         #[serde(default)]
         bias: [f32; 4],
     },
+    Cells(Box<CellTexture>),
     Attribute {
         name: String,
         default: [f32; 4],
@@ -201,6 +219,11 @@ impl Texture {
             true => Ok(()),
             false => Err(fail(format!("there is no image {image}"))),
         };
+        let check_place = |place: &Place| match place {
+            Place::Attribute(of) if of.is_empty() => Err(fail("place names no attribute".into())),
+            Place::Attribute(_) => Ok(()),
+            Place::Value(v) => composition::check(std::slice::from_ref(v), name, before),
+        };
         match serde_json::from_str(json).map_err(|e| fail(e.to_string()))? {
             Json::Constant { value } => {
                 finite("value", &value)?;
@@ -231,13 +254,7 @@ impl Texture {
             }
             Json::Noise { place, image, detail, roughness, lacunarity, distortion, colored, scale, bias } => {
                 exists(image)?;
-                match &place {
-                    Place::Attribute(of) if of.is_empty() => {
-                        return Err(fail("place names no attribute".into()));
-                    }
-                    Place::Attribute(_) => {}
-                    Place::Value(v) => composition::check(std::slice::from_ref(v), name, before)?,
-                }
+                check_place(&place)?;
                 finite("noise", &[detail, roughness, lacunarity, distortion])?;
                 finite("scale", &scale)?;
                 finite("bias", &bias)?;
@@ -246,6 +263,17 @@ impl Texture {
                 let noise = Fractal { detail, roughness, lacunarity, distortion };
                 let (scale, bias) = (scale.into(), bias.into());
                 Ok(Self::Noise(Box::new(NoiseTexture { place, noise, colored, image, scale, bias })))
+            }
+            Json::Cells(mut texture) => {
+                check_place(&texture.place)?;
+                let c = &mut texture.cells;
+                let numbers = [c.exponent, c.smoothness, c.randomness, c.detail, c.roughness, c.lacunarity];
+                finite("cells", &numbers)?;
+                c.exponent = c.exponent.max(0.01);
+                c.randomness = c.randomness.clamp(0.0, 1.0);
+                c.detail = c.detail.clamp(0.0, MOST_DETAIL);
+                c.roughness = c.roughness.clamp(0.0, 1.0);
+                Ok(Self::Cells(texture))
             }
             Json::Attribute { name: attribute, default } => {
                 finite("default", &default)?;

@@ -2,7 +2,7 @@
 
 use crate::math::luminance;
 use crate::scene::mesh::Attribute;
-use crate::scene::texture::{ImageTexture, NoiseTexture, Place, Reconstruction, Texture, Wrap};
+use crate::scene::texture::{CellTexture, ImageTexture, NoiseTexture, Place, Reconstruction, Texture, Wrap};
 use crate::scene::value::{Channel, Value};
 use crate::scene::{Image, Mesh, Scene};
 use glam::{Vec2, Vec3, Vec4};
@@ -38,7 +38,7 @@ pub struct TextureSet {
     color_names: Vec<Box<[u32]>>,
 }
 
-/// Share of the finest length of noise over which it is taken for straight.
+/// Share of the finest length of patterns over which they are taken for straight.
 const FINE: f32 = 0.02;
 
 /// Name number that means "the first set".
@@ -54,6 +54,7 @@ impl TextureSet {
                 Texture::Constant(_) | Texture::Multilinear(_) | Texture::Table(_) => None,
                 Texture::Image(t) => Some(t.uv.as_str()),
                 Texture::Noise(t) => attribute_of(&t.place),
+                Texture::Cells(t) => attribute_of(&t.place),
                 Texture::Attribute { name, .. } => Some(name.as_str()),
             })
             .collect();
@@ -69,6 +70,7 @@ impl TextureSet {
                 Texture::Constant(_) | Texture::Multilinear(_) | Texture::Table(_) => FIRST,
                 Texture::Image(t) => number(&t.uv),
                 Texture::Noise(t) => attribute_of(&t.place).map_or(FIRST, number),
+                Texture::Cells(t) => attribute_of(&t.place).map_or(FIRST, number),
                 Texture::Attribute { name, .. } => number(name),
             })
             .collect();
@@ -90,7 +92,8 @@ impl TextureSet {
                 let image = &self.scene.images[t.image as usize];
                 sample(image, t, t.transform.transform_point2(uv)) * t.scale + t.bias
             }
-            Texture::Noise(t) => self.noise(t, self.place(texture, t, at)),
+            Texture::Noise(t) => self.noise(t, self.place(texture, &t.place, at)),
+            Texture::Cells(t) => cells(t, self.place(texture, &t.place, at)),
             Texture::Attribute { default, .. } => self.attribute(texture, at).unwrap_or(*default),
             Texture::Multilinear(t) => self.multilinear(t, at).extend(1.0),
             Texture::Table(t) => self.table(t, at).extend(1.0),
@@ -105,8 +108,8 @@ impl TextureSet {
     }
 
     /// Where noise is looked up.
-    fn place(&self, texture: u32, t: &NoiseTexture, at: &MeshPoint) -> Vec3 {
-        match t.place.value() {
+    fn place(&self, texture: u32, place: &Place, at: &MeshPoint) -> Vec3 {
+        match place.value() {
             Some(v) => self.color(v, at),
             None => self.attribute(texture, at).unwrap_or(Vec4::ZERO).truncate(),
         }
@@ -174,22 +177,12 @@ impl TextureSet {
                 edges.map(along)
             }
             Texture::Noise(t) => {
-                let place = self.place(texture, t, at);
-                let edges = match t.place.value() {
-                    Some(v) => self.color_slopes(v, at),
-                    None => {
-                        let corner = |u, v| self.place(texture, t, &at.moved(u, v));
-                        [corner(1.0, 0.0), corner(0.0, 1.0)].map(|end| end - corner(0.0, 0.0))
-                    }
-                };
-                let along = |edge: Vec3| {
-                    let length = edge.length();
-                    let step = 0.5 * FINE * t.noise.finest();
-                    let d = edge * (step / length);
-                    let rise = self.noise(t, place + d) - self.noise(t, place - d);
-                    if length > 0.0 { rise * (length / (2.0 * step)) } else { Vec4::ZERO }
-                };
-                edges.map(along)
+                let step = FINE * t.noise.finest();
+                self.pattern_slopes(texture, &t.place, at, step, |p| self.noise(t, p))
+            }
+            Texture::Cells(t) => {
+                let step = FINE * t.cells.finest();
+                self.pattern_slopes(texture, &t.place, at, step, |p| cells(t, p))
             }
             Texture::Attribute { .. } => {
                 let corner = |u, v| self.lookup(texture, &at.moved(u, v));
@@ -200,6 +193,34 @@ impl TextureSet {
             Texture::Table(t) => self.table_slopes(t, at).map(|s| s.extend(0.0)),
         };
         slopes.map(|s| part(channel, s))
+    }
+
+    /// The slopes of a pattern along the edges of the triangle, taken over a length of `step`.
+    fn pattern_slopes(
+        &self,
+        texture: u32,
+        place: &Place,
+        at: &MeshPoint,
+        step: f32,
+        pattern: impl Fn(Vec3) -> Vec4,
+    ) -> [Vec4; 2] {
+        let middle = self.place(texture, place, at);
+        let edges = match place.value() {
+            Some(v) => self.color_slopes(v, at),
+            None => {
+                let corner = |u, v| self.place(texture, place, &at.moved(u, v));
+                [corner(1.0, 0.0), corner(0.0, 1.0)].map(|end| end - corner(0.0, 0.0))
+            }
+        };
+        edges.map(|edge| {
+            let length = edge.length();
+            let d = edge * (0.5 * step / length);
+            if length > 0.0 {
+                (pattern(middle + d) - pattern(middle - d)) * (length / step)
+            } else {
+                Vec4::ZERO
+            }
+        })
     }
 
     /// The coordinates of an image before its transform, and their slopes along the edges of the triangle.
@@ -226,6 +247,11 @@ impl TextureSet {
         let i = index(&self.uv_names[at.mesh as usize], self.texture_names[texture as usize])?;
         Some(interpolate(&mesh.uvs[i].1, mesh, at))
     }
+}
+
+fn cells(t: &CellTexture, place: Vec3) -> Vec4 {
+    let value = if t.colored { t.cells.color(place) } else { Vec3::splat(t.cells.distance(place)) };
+    value.extend(1.0)
 }
 
 /// The attribute by which a place is told.

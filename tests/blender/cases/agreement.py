@@ -337,6 +337,32 @@ def case_coloured_noise() -> None:
         _check_floor(use)
 
 
+def case_cells() -> None:
+    """Distances through a ramp, and colours, on floor and ball."""
+    for output, properties, inputs in (
+        ("Color", {}, {}),
+        ("Distance", {}, {"Randomness": 0.6}),
+        # Sums of colours that are not normalized would reflect more light than arrives.
+        ("Color", {"feature": "F2", "distance": "MANHATTAN", "normalize": True}, {"Detail": 1.5}),
+        ("Distance", {"feature": "F2", "normalize": True}, {"Detail": 2.0, "Roughness": 0.6}),
+        ("Distance", {"feature": "SMOOTH_F1", "distance": "MINKOWSKI"}, {"Exponent": 1.5}),
+        ("Color", {"feature": "SMOOTH_F1"}, {"Smoothness": 0.8}),
+        ("Distance", {"feature": "DISTANCE_TO_EDGE"}, {}),
+        ("Distance", {"distance": "CHEBYCHEV", "normalize": True}, {}),
+    ):
+        tree, texture, diffuse = _floor_of("TexVoronoi", "Object")
+        for name, value in properties.items():
+            setattr(texture, name, value)
+        for name, value in {"Scale": 1.5, **inputs}.items():
+            texture.inputs[name].default_value = value
+        if output == "Color":
+            tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
+        else:
+            _through_ramp(tree, texture, diffuse, 0.1, 0.7)
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        _check_floor(output, properties, inputs)
+
+
 def case_noise() -> None:
     """As colour through a ramp and as bumps, on floor and ball."""
     for inputs, space, as_bumps in (

@@ -405,11 +405,11 @@ def case_arithmetic_on_images() -> None:
 def case_unsupported_nodes_are_named_once() -> None:
     tree = Tree()
     diffuse = tree.surface(tree.node("BsdfDiffuse"))
-    cells = tree.node("TexVoronoi")
+    magic = tree.node("TexMagic")
     for name in ("Color", "Roughness"):
-        tree.link(cells.outputs["Color"], diffuse.inputs[name])
+        tree.link(magic.outputs["Color"], diffuse.inputs[name])
     surface, _, warnings = tree.export()
-    assert len(warnings) == 1 and "Voronoi Texture" in warnings[0], warnings
+    assert len(warnings) == 1 and "Magic Texture" in warnings[0], warnings
     _close(surface["color"], 0.5)
     # Two images that are looked up differently are multiplied where they are looked up.
     first, second = tree.node("TexImage"), tree.node("TexImage")

@@ -169,13 +169,15 @@ def case_patterns_without_a_counterpart_are_named() -> None:
         ("TexWave", {"wave_type": "RINGS"}, {}),
         ("TexWave", {}, {"Distortion": 2.0}),
         ("TexNoise", {"noise_dimensions": "4D"}, {}),
-        ("TexVoronoi", {}, {}),
+        ("TexVoronoi", {"voronoi_dimensions": "4D"}, {}),
+        ("TexVoronoi", {"feature": "DISTANCE_TO_EDGE"}, {"Detail": 1.0}),
+        ("TexMagic", {}, {}),
     ):
         shader = tree.surface(tree.node("BsdfDiffuse"))
         texture = tree.node(kind, **inputs)
         for key, value in properties.items():
             setattr(texture, key, value)
-        tree.link(texture.outputs["Color"], shader.inputs["Color"])
+        tree.link(next(o for o in texture.outputs if o.enabled), shader.inputs["Color"])
         warnings = tree.export()[2]
         assert any(f"'{texture.name}'" in text for text in warnings), (kind, properties, warnings)
 
