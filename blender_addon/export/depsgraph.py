@@ -47,7 +47,10 @@ class Exporter:
             return False
         # Materials come first: they tell which attributes of the meshes are read.
         slots = [
-            [self._translator.material(material) for material in group.traits.materials]
+            [
+                self._translator.material(material, group.traits.info)
+                for material in group.traits.materials
+            ]
             for group in found.groups
         ]
         for group, materials in zip(found.groups, slots, strict=True):

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..log import ExportLog
+from .object_info import ObjectInfo, asked, object_info
 
 # How often, in objects, the user's wish to stop is looked up.
 _STOP_INTERVAL = 1024
@@ -38,11 +39,12 @@ class ObjectTraits:
     materials: tuple[bpy.types.Material | None, ...]
     camera_visible: bool
     pass_index: int
+    info: ObjectInfo | None
 
 
 @dataclass
 class Group:
-    """Instances of one mesh that share materials and visibility.
+    """Instances of one mesh that share materials, what these ask of objects, and visibility.
 
     `members` are indices into the depsgraph's list.
     """
@@ -122,6 +124,8 @@ class _Surveyor:
         self.by_object: dict[tuple, Group] = {}
         self.lights: list[LightInstance] = []
         self.seen: set[int] = set()
+        # What each material asks of objects.
+        self.asked: dict[int, frozenset[str]] = {}
 
     def visit(self, index: int, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Sort one entry of the depsgraph's list into a group or into the lights."""
@@ -134,14 +138,17 @@ class _Surveyor:
             if not _visible(item):
                 return
             parent = instance.parent if instance.is_instance else None
+            materials = self._materials(item)
+            info = object_info(item, instance, frozenset().union(*map(self._asked, materials)))
             key = (
                 item.original.as_pointer(),
                 item.data.as_pointer(),
                 parent.original.as_pointer() if parent else 0,
+                info,
             )
             group = self.by_object.get(key)
             if group is None:
-                group = self.by_object[key] = self._group(item, parent)
+                group = self.by_object[key] = self._group(item, parent, materials, info)
             group.members.append(index)
         elif item.type == "LIGHT":
             self._warn_once(item)
@@ -158,17 +165,31 @@ class _Surveyor:
             _warn_object(item, self.view_layer, self.log)
             _warn_particles(item, self.log)
 
-    def _group(self, item: bpy.types.Object, parent: bpy.types.Object | None) -> Group:
+    def _materials(self, item: bpy.types.Object) -> tuple[bpy.types.Material | None, ...]:
+        slots = tuple(slot.material for slot in item.material_slots) or (None,)
+        return (self.override,) * len(slots) if self.override else slots
+
+    def _asked(self, material: bpy.types.Material | None) -> frozenset[str]:
+        pointer = material.as_pointer() if material else 0
+        if pointer not in self.asked:
+            self.asked[pointer] = asked(material)
+        return self.asked[pointer]
+
+    def _group(
+        self,
+        item: bpy.types.Object,
+        parent: bpy.types.Object | None,
+        materials: tuple[bpy.types.Material | None, ...],
+        info: ObjectInfo | None,
+    ) -> Group:
         """The group of an object's mesh; objects that look alike share one."""
         self._warn_once(item)
-        slots = tuple(slot.material for slot in item.material_slots) or (None,)
-        materials = (self.override,) * len(slots) if self.override else slots
         visible = _camera_visible(item, self.view_layer)
         if parent is not None:
             visible = visible and _camera_visible(parent, self.view_layer)
-        traits = ObjectTraits(item.name, materials, visible, item.pass_index)
+        traits = ObjectTraits(item.name, materials, visible, item.pass_index, info)
         pointers = tuple(material.as_pointer() if material else 0 for material in materials)
-        key = (item.data.as_pointer(), pointers, visible, item.pass_index)
+        key = (item.data.as_pointer(), pointers, visible, item.pass_index, info)
         return self.groups.setdefault(key, Group(traits, item.data))
 
 

@@ -1,4 +1,4 @@
-"""Displacement: what a material's surface is raised by, as a bump map."""
+"""Displacement: what a material's surface is raised by."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from .evaluate import Evaluator
 from .tree import is_linked, resolve, socket
 from .values import Constant
 
-_NOT_MOVED = "displacement that moves the surface"
 
-
-def raised(ev: Evaluator, output: bpy.types.Node, method: str) -> dict[str, Any] | None:
-    """The bump map of a material's displacement; None where it has none that would show."""
+def raised(ev: Evaluator, output: bpy.types.Node) -> dict[str, Any] | None:
+    """How high a material raises its surface, as the ABI writes it; None where it does not."""
     source = resolve(socket(output, "Displacement"), ())
     node = source.node
     if node is None:
@@ -30,11 +28,7 @@ def raised(ev: Evaluator, output: bpy.types.Node, method: str) -> dict[str, Any]
         lambda height, middle, scale: (height - middle) * scale,
         *ev.inputs(node, source.stack, "Height", "Midlevel", "Scale"),
     )
-    if isinstance(height, Constant):
-        if height.rgb[0] != 0.0 and method != "BUMP":
-            ev.warn(node, _NOT_MOVED, "the surface is left as it is")
+    if height == Constant.number(0.0):
         return None
-    if method != "BUMP":
-        ev.warn(node, _NOT_MOVED, "it is shown as bumps")
     space = "object" if node.space == "OBJECT" else "world"
     return {"height": ev.textures.json(height, "float"), "space": space}

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from ..export.object_info import ObjectInfo
 from ..log import ExportLog
 from .composition import compose
 from .coordinates import AS_IT_IS
@@ -44,7 +45,6 @@ _STAND_INS: dict[tuple[str, str], tuple[float, ...]] = {
     ("ShaderNodeLightPath", "Transparent Depth"): (0.0,),
     ("ShaderNodeLightPath", "Transmission Depth"): (0.0,),
     ("ShaderNodeWireframe", "Fac"): (0.0,),
-    ("ShaderNodeObjectInfo", "Color"): (1.0, 1.0, 1.0),
 }
 
 
@@ -59,15 +59,21 @@ class Evaluator:
         *,
         world: bool = False,
         camera: bool | None = None,
+        info: ObjectInfo | None = None,
     ) -> None:
-        """`camera`: whether it is for rays from the camera, where these are told from others."""
+        """`camera`: whether it is for rays from the camera, where these are told from others.
+
+        `info`: what is known of the object.
+        """
         self.owner = owner
         self.textures = textures
         self.log = log
         self.world = world
         self.camera = camera
-        #: Whether a value depends on that.
+        self.info = info
+        #: Whether a value depends on the camera, and on the object.
         self.tells_camera = False
+        self.tells_object = False
         #: What is said where a pattern of a world is simplified: it may yet become a picture.
         self.simplified: list[str] = []
         self._memo: dict[tuple, Value] = {}

@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..export.object_info import ObjectInfo
 from ..log import ExportLog
 from .closures import BLACK, Closure, ClosureTranslator
 from .displacement import raised
@@ -30,38 +31,52 @@ class Translator:
     def __init__(self, scene: Any, log: ExportLog) -> None:
         self._scene = scene
         self._log = log
-        self._materials: dict[int, int] = {}
+        self._materials: dict[tuple[int, ObjectInfo | None], int] = {}
         #: Names of the projections that each material looks up, by its id.
         self.projections: dict[int, frozenset[str]] = {}
         self.textures = TextureStore(scene, log)
 
-    def material(self, material: bpy.types.Material | None) -> int:
-        """Id of a material; None stands for an empty slot, which is grey."""
-        key = material.as_pointer() if material else 0
-        if key not in self._materials:
-            name = material.name if material else "Default"
-            self.textures.asked.clear()
-            self._materials[key] = self._scene.add_material(name, self._material_json(material))
-            self.projections[self._materials[key]] = frozenset(self.textures.asked)
-        return self._materials[key]
+    def material(self, material: bpy.types.Material | None, info: ObjectInfo | None = None) -> int:
+        """Id of a material; None stands for an empty slot, which is grey.
 
-    def _material_json(self, material: bpy.types.Material | None) -> dict[str, Any]:
+        `info`: what the materials of the object ask of it; each that does is one of its own.
+        """
+        pointer = material.as_pointer() if material else 0
+        known = self._materials.get((pointer, None), self._materials.get((pointer, info)))
+        if known is not None:
+            return known
+        name = material.name if material else "Default"
+        self.textures.asked.clear()
+        data, tells_object = self._material_json(material, info)
+        identifier = self._scene.add_material(name, data)
+        self._materials[pointer, info if tells_object else None] = identifier
+        self.projections[identifier] = frozenset(self.textures.asked)
+        return identifier
+
+    def _material_json(
+        self, material: bpy.types.Material | None, info: ObjectInfo | None
+    ) -> tuple[dict[str, Any], bool]:
+        """A material, and whether it depends on the object."""
         if material is None:
-            return {"surface": _DEFAULT_SURFACE}
+            return {"surface": _DEFAULT_SURFACE}, False
         result: dict[str, Any] = {"pass_index": material.pass_index}
         if not material.use_nodes or material.node_tree is None:
             result["surface"] = {"type": "diffuse", "color": list(material.diffuse_color[:3])}
-            return result
+            return result, False
         output = material.node_tree.get_output_node("CYCLES")
         if output is None:
             result["surface"] = BLACK
-            return result
+            return result, False
         owner = f"Material '{material.name}'"
-        evaluator = Evaluator(owner, self.textures, self._log)
+        evaluator = Evaluator(owner, self.textures, self._log, info=info)
         # Blender 4.1 moved this from Cycles' settings.
         cycles = getattr(material, "cycles", None)
         method = getattr(material, "displacement_method", None) or cycles.displacement_method
-        result["surface"] = self._surface(evaluator, output, method)
+        height = raised(evaluator, output)
+        has_bumps = bool(height and method != "DISPLACEMENT" and isinstance(height["height"], dict))
+        if height and method != "BUMP":
+            result["displacement"] = {**height, "keeps_normals": has_bumps}
+        result["surface"] = self._surface(evaluator, output, height if has_bumps else None)
         inside = absorption(evaluator, socket(output, "Volume"))
         if inside.any():
             result["absorption"] = inside.tolist()
@@ -72,13 +87,15 @@ class Translator:
             self._log.warn(
                 f"{owner}: opaque shadows are not supported, its shadows are transparent"
             )
-        return result
+        return result, evaluator.tells_object
 
-    def _surface(self, evaluator: Evaluator, output: bpy.types.Node, method: str) -> dict[str, Any]:
+    def _surface(
+        self, evaluator: Evaluator, output: bpy.types.Node, bumps: dict[str, Any] | None
+    ) -> dict[str, Any]:
         surface = socket(output, "Surface")
         if is_linked(socket(output, "Volume")) and not is_linked(surface):
             return {"type": "transparent", "color": [1.0, 1.0, 1.0]}
-        return ClosureTranslator(evaluator, raised(evaluator, output, method)).closure(surface)
+        return ClosureTranslator(evaluator, bumps).closure(surface)
 
     def world_radiance(self, world: bpy.types.World) -> tuple[list[Value], list[str]]:
         """Radiance of a world with nodes: a colour, or an image looked up by direction.

@@ -58,6 +58,22 @@ def _light_path(
     return Constant.number(float(ev.camera))
 
 
+def _object_info(
+    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+) -> Value:
+    known = ev.info
+    values = known and {
+        "Random": Constant.number(known.random),
+        "Color": Constant.color(known.color),
+        "Alpha": Constant.number(known.alpha),
+        "Object Index": Constant.number(known.index),
+    }
+    if not values or output.identifier not in values:
+        raise UnsupportedError(f"the output '{output.name}'")
+    ev.tells_object = True
+    return values[output.identifier]
+
+
 def _image(
     ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
 ) -> Value:
@@ -320,4 +336,5 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeBlackbody": _blackbody,
     "ShaderNodeLightFalloff": _falloff,
     "ShaderNodeLightPath": _light_path,
+    "ShaderNodeObjectInfo": _object_info,
 }

@@ -1,7 +1,7 @@
 //! Materials: a small tree of closures whose parameters are constants or textures.
 
 use super::SceneError;
-use super::relief::Relief;
+use super::relief::{BumpSpace, Relief};
 use super::value::Value;
 use glam::Vec3;
 use serde::Deserialize;
@@ -191,8 +191,24 @@ pub struct Material {
     pub opacity: Value,
     /// Absorption coefficient of the inside of objects, per scene unit.
     pub absorption: Vec3,
+    /// What moves the surface.
+    pub displacement: Option<Displacement>,
     /// Value of the Material Index pass.
     pub pass_index: u32,
+}
+
+/// How far vertices move along their normals.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Displacement {
+    /// The distance.
+    pub height: Value,
+    /// The space whose units it has.
+    #[serde(default)]
+    pub space: BumpSpace,
+    /// Whether shading normals stay those of the surface that is moved, since a bump map has its slopes.
+    #[serde(default)]
+    pub keeps_normals: bool,
 }
 
 #[derive(Deserialize)]
@@ -203,6 +219,8 @@ struct Json {
     opacity: Value,
     #[serde(default)]
     absorption: [f32; 3],
+    #[serde(default)]
+    displacement: Option<Displacement>,
     #[serde(default)]
     pass_index: u32,
 }
@@ -218,6 +236,7 @@ impl Default for Material {
             surface: Closure::Diffuse { color: eight_tenths(), roughness: zero(), normal: None },
             opacity: one(),
             absorption: Vec3::ZERO,
+            displacement: None,
             pass_index: 0,
         }
     }
@@ -231,12 +250,12 @@ impl Material {
         if j.surface.depth() > MAX_DEPTH {
             return Err(fail(format!("its tree of closures is deeper than {MAX_DEPTH}")));
         }
-        let Json { surface, opacity, absorption, pass_index } = j;
+        let Json { surface, opacity, absorption, displacement, pass_index } = j;
         let absorption = Vec3::from(absorption);
         if !(absorption.is_finite() && absorption.min_element() >= 0.0) {
             return Err(fail("its absorption is negative or not finite".to_string()));
         }
-        let material = Self { name: name.into(), surface, opacity, absorption, pass_index };
+        let material = Self { name: name.into(), surface, opacity, absorption, displacement, pass_index };
         let mut problem = None;
         material.for_each_value(&mut |v| {
             problem = problem.take().or(match v {
@@ -280,6 +299,9 @@ impl Material {
     /// Calls `f` with every parameter, normal maps as textures.
     pub fn for_each_value(&self, f: &mut dyn FnMut(&Value)) {
         f(&self.opacity);
+        if let Some(displacement) = &self.displacement {
+            f(&displacement.height);
+        }
         self.surface.for_each(&mut |c| c.own_values(f));
     }
 }

@@ -6,6 +6,7 @@ pub mod lobes;
 
 mod class;
 mod composition;
+mod displacement;
 mod emissive;
 mod first_hit;
 mod interior;

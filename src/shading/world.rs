@@ -3,6 +3,7 @@
 
 use super::bsdf::Bsdf;
 use super::class::SurfaceClass;
+use super::displacement::displaced;
 use super::emissive::emissive_triangles;
 use super::emitters::{EmitterHit, Emitters, Incident, MeshTriangle, Receiver, SceneBounds};
 use super::material::Materials;
@@ -94,6 +95,16 @@ impl World {
         let needs = if keep_all { Needs::ALL } else { Needs::of(&scene) };
         let mut warnings = scene.warnings.clone();
         let mut costs = Vec::new();
+
+        let start = Instant::now();
+        let given = scene.clone();
+        let scene = displaced(scene, &mut warnings);
+        if !Arc::ptr_eq(&scene, &given) {
+            let bytes = scene.meshes[given.meshes.len()..].iter().map(|m| m.memory_bytes() as u64).sum();
+            let seconds = start.elapsed().as_secs_f64();
+            costs.push(BuildCost { name: "displacement", seconds, bytes });
+        }
+        drop(given);
 
         let start = Instant::now();
         let meshes: Vec<MeshGeometry> = scene

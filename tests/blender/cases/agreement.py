@@ -471,6 +471,34 @@ def _bent(tree: bpy.types.NodeTree, space: str) -> bpy.types.NodeSocket:
     return turn.outputs[0]
 
 
+def case_objects_with_colours_of_their_own() -> None:
+    """By their random number and colour: objects that share mesh and material, and instances."""
+    tree, info, diffuse = _floor_of("ObjectInfo", "")
+    mix = tree.nodes.new("ShaderNodeMixRGB")
+    tree.links.new(info.outputs["Random"], mix.inputs["Fac"])
+    tree.links.new(info.outputs["Color"], mix.inputs["Color1"])
+    mix.inputs["Color2"].default_value = (0.1, 0.6, 0.1, 1)
+    tree.links.new(mix.outputs["Color"], diffuse.inputs["Color"])
+    ball = bpy.data.objects["Ball"]
+    ball.data.materials[0] = bpy.data.materials["Floor"]
+    group = bpy.data.collections.new("Small")
+    small = bpy.data.objects.new("Grain", ball.data)
+    group.objects.link(small)
+    small.color = (0.2, 0.2, 0.9, 1)
+    for index in range(6):
+        turn = Matrix.Rotation(index, 4, "Z") @ Matrix.Translation((1.6, 0, 0.3))
+        place = turn @ Matrix.Scale(0.3, 4)
+        if index % 2:
+            item = bpy.data.objects.new("Group", None)
+            item.instance_type, item.instance_collection = "COLLECTION", group
+        else:
+            item = bpy.data.objects.new("Ball", ball.data)
+            item.color = (0.9, 0.1 * index, 0.2, 1)
+        bpy.context.scene.collection.objects.link(item)
+        item.matrix_world = place
+    _check_floor("objects")
+
+
 def case_coordinates_that_are_computed() -> None:
     """Bent ones for pictures and patterns, and single ones as numbers."""
     pixels = np.ones((8, 8, 4), np.float32)
@@ -582,21 +610,28 @@ def case_bump_maps_look_alike() -> None:
 
 
 def case_displacement_looks_alike() -> None:
-    """Bumps by displacement, of objects of another size than one."""
-    for space in ("OBJECT", "WORLD"):
+    """As bumps, as a moved surface and as both, of objects of another size than one."""
+    for method, space in (
+        ("BUMP", "OBJECT"),
+        ("BUMP", "WORLD"),
+        ("DISPLACEMENT", "OBJECT"),
+        ("DISPLACEMENT", "WORLD"),
+        ("BOTH", "OBJECT"),
+    ):
         tree, noise, _ = _floor_of("TexNoise", "Object")
         noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = 3.0, 1.0
         raised = tree.nodes.new("ShaderNodeDisplacement")
         raised.space = space
-        raised.inputs["Scale"].default_value = 0.06
+        # Of steep bumps Cycles softens the terminator.
+        raised.inputs["Scale"].default_value = 0.3 if method == "DISPLACEMENT" else 0.06
         tree.links.new(noise.outputs[0], raised.inputs["Height"])
         output = tree.get_output_node("CYCLES")
         tree.links.new(raised.outputs[0], output.inputs["Displacement"])
-        bpy.data.materials["Floor"].displacement_method = "BUMP"
+        bpy.data.materials["Floor"].displacement_method = method
         ball = bpy.data.objects["Ball"]
         ball.data.materials[0] = bpy.data.materials["Floor"]
         ball.matrix_world = ball.matrix_world @ Matrix.Diagonal((1.3, 1.3, 0.8, 1))
-        _check_floor(space)
+        _check_floor(method, space)
 
 
 def case_coarse_smoothed_mirrors_have_no_dark_rims() -> None:

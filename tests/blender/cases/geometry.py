@@ -381,3 +381,25 @@ def case_attributes_of_edges() -> None:
     ]
     assert found.interpolation == "vertex"
     np.testing.assert_allclose(found.data, np.repeat(np.array(wanted)[:, None], 3, axis=1))
+
+
+def case_materials_are_shared_unless_they_ask_for_the_object() -> None:
+    material, tree, output = builders.material("Tested")
+    shader, info = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeObjectInfo")
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    data = builders.quad()
+    data.materials.append(material)
+    for index in range(3):
+        item = builders.link(data)
+        item.pass_index = min(index, 1)
+        item.color = (0.25 * index, 0.5, 1.0, 0.5)
+    # Nothing is asked, then what two have in common, then what none has.
+    for name, count in ((None, 1), ("Alpha", 1), ("Object Index", 2), ("Color", 3), ("Random", 3)):
+        if name:
+            tree.links.new(info.outputs[name], shader.inputs["Color"])
+        scene, warnings = builders.export()
+        assert not warnings and len(scene.materials) == count, (name, len(scene.materials))
+        assert len(scene.meshes) == 1
+    tree.links.new(info.outputs["Location"], shader.inputs["Color"])
+    _, warnings = builders.export()
+    assert len(warnings) == 1 and "'Location'" in warnings[0], warnings

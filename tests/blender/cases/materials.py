@@ -471,7 +471,7 @@ def case_volumes_are_named() -> None:
     assert len(warnings) == 1 and "Volume Scatter" in warnings[0], warnings
 
 
-def case_displacement_is_a_bump_map() -> None:
+def case_displacement() -> None:
     tree = Tree()
     shader, cover = tree.node("BsdfPrincipled"), tree.node("BsdfDiffuse")
     both = tree.surface(tree.node("AddShader"))
@@ -479,24 +479,37 @@ def case_displacement_is_a_bump_map() -> None:
     tree.link(cover.outputs[0], both.inputs[1])
     raised = tree.node("Displacement", Midlevel=0.25, Scale=0.5)
     tree.link(raised.outputs[0], tree.output.inputs["Displacement"])
-    for method, named in (("BUMP", 0), ("BOTH", 1), ("DISPLACEMENT", 1)):
-        tree.material.displacement_method = method
-        # The same everywhere, it shows only if the surface is moved.
-        raised.inputs["Height"].default_value = 0.75
-        surface, _, warnings = tree.export()
-        assert "normal" not in surface["a"] and len(warnings) == named, (method, warnings)
     image = tree.node("TexImage")
     pixels = np.full((2, 2, 4), 0.75, np.float32)
     image.image = builders.image("Heights", pixels, "Non-Color", is_float=True)
-    tree.link(image.outputs["Color"], raised.inputs["Height"])
-    for method, named in (("BUMP", 0), ("BOTH", 1), ("DISPLACEMENT", 1)):
+
+    def exported(method: str) -> tuple[dict, dict | None, Any]:
         tree.material.displacement_method = method
-        surface, scene, warnings = tree.export()
-        assert len(warnings) == named, (method, warnings)
+        scene, warnings = builders.export()
+        assert not warnings, (method, warnings)
+        data = scene.materials[0][1]
+        return data["surface"], data.get("displacement"), scene
+
+    for method in ("BUMP", "BOTH", "DISPLACEMENT"):
+        # The same everywhere, it shows only if the surface is moved.
+        raised.inputs["Height"].default_value = 0.75
+        surface, displacement, _ = exported(method)
+        assert "normal" not in surface["a"]
+        if method != "BUMP":
+            _close(displacement["height"], 0.25)
+        assert (method == "BUMP") == (displacement is None)
+        tree.link(image.outputs["Color"], raised.inputs["Height"])
+        surface, displacement, scene = exported(method)
         for part, key in (("a", "normal"), ("a", "coat_normal"), ("b", "normal")):
-            assert surface[part][key]["space"] == "object", surface
-            texture = scene.textures[surface[part][key]["height"]["texture"]][1]
-            _close(scene.images[texture["image"]]["pixels"][0, 0, 0], 0.25)
+            assert (key in surface[part]) == (method != "DISPLACEMENT")
+        for found in (displacement, surface["b"].get("normal")):
+            if found:
+                assert found["space"] == "object"
+                texture = scene.textures[found["height"]["texture"]][1]
+                _close(scene.images[texture["image"]]["pixels"][0, 0, 0], 0.25)
+        tree.tree.links.remove(raised.inputs["Height"].links[0])
+    tree.link(image.outputs["Color"], raised.inputs["Height"])
+    tree.material.displacement_method = "BUMP"
     # A bump map is raised over it, a normal map takes its place.
     bump, waves = tree.node("Bump"), tree.node("TexWave")
     tree.link(waves.outputs[0], bump.inputs["Height"])
