@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arithmetic import array
 from .values import (
     Baked,
     Composed,
@@ -21,7 +22,6 @@ from .values import (
     Kind,
     UnsupportedError,
     Value,
-    array,
     bounds,
     component,
 )

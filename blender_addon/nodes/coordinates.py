@@ -2,60 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 
 import bpy
 import numpy as np
 from mathutils import Euler
 
 from .tree import Source, Stack, resolve, socket
-from .values import Constant, UnsupportedError, Value
+from .values import Constant, Coordinates, UnsupportedError, Value
 
 #: The texture transform that changes nothing.
 AS_IT_IS = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 # Gives the value of an input socket.
 Evaluate = Callable[[bpy.types.NodeSocket, Stack], Value]
-
-
-@dataclass(frozen=True)
-class Coordinates:
-    """`matrix` (4x4) times a UV map, times where a point of the mesh is, or times a direction.
-
-    `space`: "uv"; "generated" or "object" (see `export.mesh.Projection`); "environment".
-    """
-
-    space: str
-    uv: str
-    matrix: np.ndarray
-
-    def by(self, matrix: np.ndarray) -> Coordinates:
-        """A 4x4 matrix times these."""
-        return replace(self, matrix=matrix @ self.matrix)
-
-    def scaled(self, factor: float) -> Coordinates:
-        """The same times a number."""
-        return self.by(np.diag([factor, factor, factor, 1.0]))
-
-    def along(self, row: Sequence[float]) -> Coordinates:
-        """`row` (4) times these, as the first coordinate; the others are constant."""
-        rest = [[0.0, 0.0, 0.0, height] for height in (0.5, 0.0, 1.0)]
-        return self.by(np.array([row, *rest]))
-
-    def uv_transform(self) -> tuple[float, ...]:
-        """The six numbers of the ABI's texture transform; UV maps have a third component of 0."""
-        return tuple(float(value) for value in self.matrix[:2][:, [0, 1, 3]].ravel())
-
-    def point(self) -> np.ndarray | None:
-        """The point that all coordinates are mapped to; None if they differ."""
-        return None if self.matrix[:3, :3].any() else self.matrix[:3, 3]
-
-    def direction_matrix(self) -> tuple[float, ...]:
-        """The nine numbers applied to a direction; one that is also shifted cannot be expressed."""
-        if np.abs(self.matrix[:3, 3]).max() > 1e-6:
-            raise UnsupportedError("a shifted environment")
-        return tuple(float(value) for value in self.matrix[:3, :3].ravel())
 
 
 def _constant(entry: bpy.types.NodeSocket, stack: Stack, evaluate: Evaluate) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..export.object_info import ObjectInfo
 from ..log import ExportLog
+from .arithmetic import average, combine
 from .composition import compose
 from .coordinates import AS_IT_IS
 from .textures import TextureStore
@@ -22,8 +23,6 @@ from .values import (
     Sampling,
     UnsupportedError,
     Value,
-    average,
-    combine,
     convert,
 )
 

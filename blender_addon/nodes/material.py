@@ -8,6 +8,7 @@ import bpy
 
 from ..export.object_info import ObjectInfo
 from ..log import ExportLog
+from .arithmetic import average
 from .closures import BLACK, Closure, ClosureTranslator
 from .displacement import raised
 from .evaluate import Evaluator
@@ -15,7 +16,7 @@ from .interior import absorption
 from .radiance import Radiance
 from .textures import TextureStore
 from .tree import is_linked, socket
-from .values import Constant, Value, average
+from .values import Constant, Value
 
 # What Cycles gives to a surface without a material: since 5.0 what a new material looks like.
 _DEFAULT_SURFACE: dict[str, Any] = (

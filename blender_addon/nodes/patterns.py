@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from .coordinates import AS_IT_IS, Coordinates
+from .coordinates import AS_IT_IS
 from .places import looked_up, turned
 from .tree import Stack
 from .values import (
     Baked,
     Constant,
+    Coordinates,
     ImageValue,
     PatternValue,
     Sampling,

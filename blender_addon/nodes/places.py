@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from .coordinates import Coordinates, coordinates, mapping, origin
+from .coordinates import coordinates, mapping, origin
 from .tree import Source, Stack, resolve
-from .values import Constant, PlaceValue, UnsupportedError, Value, component, lookups
+from .values import Constant, Coordinates, PlaceValue, UnsupportedError, Value, component, lookups
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator

@@ -12,12 +12,13 @@ import numpy as np
 from ..export.images import Pixels, read_image
 from ..export.mesh import Projection, Reading
 from ..log import ExportLog
-from .coordinates import AS_IT_IS, Coordinates
+from .coordinates import AS_IT_IS
 from .values import (
     AttributeValue,
     Baked,
     Composed,
     Constant,
+    Coordinates,
     ImageSource,
     ImageValue,
     Kind,

@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 
 from . import operators
-from .coordinates import AS_IT_IS, Coordinates, equirectangular
+from .arithmetic import pick
+from .coordinates import AS_IT_IS, equirectangular
 from .curves import float_curve, rgb_curves
 from .patterns import checker, gradient, noise, voronoi, wave
 from .places import given, looked_up, mapped
@@ -18,6 +19,7 @@ from .values import (
     KINDS,
     AttributeValue,
     Constant,
+    Coordinates,
     ImageValue,
     Kind,
     Sampling,
@@ -25,7 +27,6 @@ from .values import (
     Value,
     component,
     convert,
-    pick,
 )
 
 if TYPE_CHECKING:

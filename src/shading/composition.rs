@@ -1,6 +1,6 @@
 //! Lookup of textures that are made of others. All is done component by component.
 
-use super::texture::{MeshPoint, TextureSet};
+use super::texture::{MeshPoint, TextureSet, finite};
 use crate::scene::composition::{Multilinear, Table};
 use crate::scene::value::Value;
 use glam::Vec3;
@@ -11,7 +11,7 @@ const MOST: usize = 3;
 impl TextureSet {
     /// The sum of products.
     pub(super) fn multilinear(&self, t: &Multilinear, at: &MeshPoint) -> Vec3 {
-        sum_of_products(&t.coefficients, &self.colors(&t.of, at)[..t.of.len()])
+        finite(sum_of_products(&t.coefficients, &self.colors(&t.of, at)[..t.of.len()]))
     }
 
     /// Its slopes along the edges of the triangle: the product rule.
@@ -181,6 +181,15 @@ mod tests {
             assert!((du - across(h, 0.0)).abs().max_element() < 1e-3, "{du}");
             assert!((dv - across(0.0, h)).abs().max_element() < 1e-3, "{dv}");
         }
+    }
+
+    #[test]
+    fn what_overflows_is_black() {
+        let json = r#"{"type":"multilinear","of":[{"texture":0}],"coefficients":[[-3e38,0,0],[3e38,1,1]]}"#;
+        let mut b = builder(1, 1, &[0.0]);
+        b.add_texture("huge", json).unwrap();
+        let square = r#"{"type":"multilinear","of":[{"texture":1},{"texture":1}],"coefficients":[[0,0,0],[0,0,0],[0,0,0],[1,1,1]]}"#;
+        assert_eq!(texture(b, square)(0.2, 0.2).0, Vec3::ZERO);
     }
 
     #[test]

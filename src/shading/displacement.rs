@@ -8,7 +8,7 @@ use crate::scene::mesh::Attribute;
 use crate::scene::relief::BumpSpace;
 use crate::scene::{InstanceGroup, Mesh, Scene, Warnings};
 use glam::{Mat3, Vec2, Vec3};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Barycentrics of a triangle's corners.
@@ -20,7 +20,7 @@ pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene
         group.materials.iter().any(|&m| scene.materials[m as usize].displacement.is_some())
     };
     // where the first of each group stands; there may be none
-    let mut stands: HashMap<u32, Mat3> = HashMap::new();
+    let mut stands: BTreeMap<u32, Mat3> = BTreeMap::new();
     for instance in &scene.instances {
         if moves(&scene.groups[instance.group as usize]) {
             stands.entry(instance.group).or_insert_with(|| Mat3::from(instance.to_world.matrix3));
@@ -31,7 +31,7 @@ pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene
     }
     let textures = TextureSet::new(scene.clone());
     let mut result = Scene::clone(&scene);
-    let mut made: HashMap<(u32, &[u32]), u32> = HashMap::new();
+    let mut made: BTreeMap<(u32, &[u32]), u32> = BTreeMap::new();
     for (k, group) in scene.groups.iter().enumerate() {
         let Some(&to_world) = stands.get(&(k as u32)) else { continue };
         let mesh = *made.entry((group.mesh, group.materials.as_slice())).or_insert_with(|| {
@@ -128,7 +128,7 @@ fn new_normals(mesh: &Mesh, positions: &[Vec3], keeps: impl Fn(usize) -> bool) -
         let vertices = mesh.triangles[t];
         [0, 1, 2].map(|k| (vertices[k], normals[k]))
     };
-    let mut sums: HashMap<(u32, [u32; 3]), Vec3> = HashMap::new();
+    let mut sums: BTreeMap<(u32, [u32; 3]), Vec3> = BTreeMap::new();
     for (t, &vertices) in mesh.triangles.iter().enumerate() {
         let n = face_normal(positions, vertices);
         keys(t).into_iter().for_each(|key| *sums.entry(key).or_default() += n);

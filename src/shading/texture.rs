@@ -251,7 +251,12 @@ impl TextureSet {
 
 fn cells(t: &CellTexture, place: Vec3) -> Vec4 {
     let value = if t.colored { t.cells.color(place) } else { Vec3::splat(t.cells.distance(place)) };
-    value.extend(1.0)
+    finite(value).extend(1.0)
+}
+
+/// What powers and products make of extreme values is 0 where it is not finite.
+pub(super) fn finite(v: Vec3) -> Vec3 {
+    if v.is_finite() { v } else { Vec3::ZERO }
 }
 
 /// The attribute by which a place is told.
