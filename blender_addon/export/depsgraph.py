@@ -45,6 +45,7 @@ class Exporter:
         found = survey(self._depsgraph, self._log, self._stop)
         if found is None:
             return False
+        self._translator.textures.extent = found.extent
         # Materials come first: they tell which attributes of the meshes are read.
         slots = [
             [

@@ -71,6 +71,8 @@ class Survey:
     groups: list[Group]
     lights: list[LightInstance]
     matrices: np.ndarray
+    #: How far meshes reach from their origins along an axis, one unit at least.
+    extent: float
 
 
 def _camera_visible(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
@@ -124,8 +126,10 @@ class _Surveyor:
         self.by_object: dict[tuple, Group] = {}
         self.lights: list[LightInstance] = []
         self.seen: set[int] = set()
-        # What each material asks of objects.
+        # What each material asks of objects, and what those of an object and its mesh do.
         self.asked: dict[int, frozenset[str]] = {}
+        self.by_object_asked: dict[tuple[int, int], frozenset[str]] = {}
+        self.extent = 1.0
 
     def visit(self, index: int, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Sort one entry of the depsgraph's list into a group or into the lights."""
@@ -138,17 +142,14 @@ class _Surveyor:
             if not _visible(item):
                 return
             parent = instance.parent if instance.is_instance else None
-            materials = self._materials(item)
-            info = object_info(item, instance, frozenset().union(*map(self._asked, materials)))
-            key = (
-                item.original.as_pointer(),
-                item.data.as_pointer(),
-                parent.original.as_pointer() if parent else 0,
-                info,
-            )
+            pointers = (item.original.as_pointer(), item.data.as_pointer())
+            if pointers not in self.by_object_asked:
+                self.by_object_asked[pointers] = self._asked_by(self._materials(item))
+            info = object_info(item, instance, self.by_object_asked[pointers])
+            key = (*pointers, parent.original.as_pointer() if parent else 0, info)
             group = self.by_object.get(key)
             if group is None:
-                group = self.by_object[key] = self._group(item, parent, materials, info)
+                group = self.by_object[key] = self._group(item, parent, info)
             group.members.append(index)
         elif item.type == "LIGHT":
             self._warn_once(item)
@@ -169,21 +170,26 @@ class _Surveyor:
         slots = tuple(slot.material for slot in item.material_slots) or (None,)
         return (self.override,) * len(slots) if self.override else slots
 
-    def _asked(self, material: bpy.types.Material | None) -> frozenset[str]:
-        pointer = material.as_pointer() if material else 0
-        if pointer not in self.asked:
-            self.asked[pointer] = asked(material)
-        return self.asked[pointer]
+    def _asked_by(self, materials: tuple[bpy.types.Material | None, ...]) -> frozenset[str]:
+        """What materials ask of the object that has them."""
+        for material in materials:
+            pointer = material.as_pointer() if material else 0
+            if pointer not in self.asked:
+                self.asked[pointer] = asked(material)
+        pointers = (material.as_pointer() if material else 0 for material in materials)
+        return frozenset().union(*(self.asked[pointer] for pointer in pointers))
 
     def _group(
         self,
         item: bpy.types.Object,
         parent: bpy.types.Object | None,
-        materials: tuple[bpy.types.Material | None, ...],
         info: ObjectInfo | None,
     ) -> Group:
         """The group of an object's mesh; objects that look alike share one."""
         self._warn_once(item)
+        materials = self._materials(item)
+        corners = np.abs(np.array(item.bound_box, np.float64))
+        self.extent = max(self.extent, float(corners[np.isfinite(corners)].max(initial=0.0)))
         visible = _camera_visible(item, self.view_layer)
         if parent is not None:
             visible = visible and _camera_visible(parent, self.view_layer)
@@ -208,4 +214,4 @@ def survey(
         if index % _STOP_INTERVAL == 0 and stop():
             return None
         surveyor.visit(index, instance)
-    return Survey(list(surveyor.groups.values()), surveyor.lights, matrices)
+    return Survey(list(surveyor.groups.values()), surveyor.lights, matrices, surveyor.extent)

@@ -29,7 +29,8 @@ def _hash_of_name(name: str) -> int:
     """
     number = 0
     for byte in name.encode():
-        number = (37 * number + byte) & _MASK
+        # Cycles' bytes have a sign.
+        number = (37 * number + byte - (byte >> 7 << 8)) & _MASK
     start = 0xDEADBEEF + (2 << 2) + 13
     a, b, c = (start + number) & _MASK, start, start
 
@@ -66,22 +67,22 @@ def asked(material: bpy.types.Material | None) -> frozenset[str]:
 
 
 def object_info(
-    item: bpy.types.Object, instance: bpy.types.DepsgraphObjectInstance, asked: frozenset[str]
+    item: bpy.types.Object, instance: bpy.types.DepsgraphObjectInstance, outputs: frozenset[str]
 ) -> ObjectInfo | None:
     """What is asked of an object; None if that is nothing."""
-    if not asked:
+    if not outputs:
         return None
     random = 0.0
-    if "Random" in asked and instance.is_instance:
+    if "Random" in outputs and instance.is_instance:
         steps = _RANDOM_STEPS - 1
         random = round((instance.random_id & _MASK) / _MASK * steps) / steps
-    elif "Random" in asked:
+    elif "Random" in outputs:
         random = _hash_of_name(item.name) / _MASK
     plain = ObjectInfo()
     r, g, b, alpha = item.color
     return ObjectInfo(
         random,
-        (r, g, b) if "Color" in asked else plain.color,
-        alpha if "Alpha" in asked else plain.alpha,
-        item.pass_index if "Object Index" in asked else plain.index,
+        (r, g, b) if "Color" in outputs else plain.color,
+        alpha if "Alpha" in outputs else plain.alpha,
+        item.pass_index if "Object Index" in outputs else plain.index,
     )

@@ -10,7 +10,7 @@ import bpy
 from .evaluate import Evaluator
 from .fresnel import fresnel_ior, layered
 from .tree import Stack, is_linked, resolve, socket
-from .values import KINDS, Composed, Constant, ImageValue, Value, bounds, convert
+from .values import KINDS, Composed, Constant, ImageValue, Value, convert, is_negative
 
 Closure = dict[str, Any]
 
@@ -265,9 +265,8 @@ class ClosureTranslator:
         if isinstance(color, Constant) and isinstance(strength, Constant):
             below = any(channel * strength.rgb[0] < 0.0 for channel in color.rgb)
         else:
-            below = (
-                strength != Constant.number(0.0) and min(*bounds(color), *bounds(strength)) < 0.0
-            )
+            some = is_negative(color) or is_negative(strength)
+            below = some and strength != Constant.number(0.0)
         if below:
             self.ev.warn(node, "negative emission", "that part is left out")
 

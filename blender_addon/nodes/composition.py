@@ -34,8 +34,11 @@ _ROW, _LONGEST_ROW = 1024, 16384
 _SQUARE, _CUBE = 256, 33
 # Spans over which squares and cubes are fine enough.
 _WIDEST_SQUARE, _WIDEST_CUBE = 4.0, 2.0
-# Points at which a function is compared with what is to stand for it.
-_PROBES = 64
+# Points at which a function is compared with what is to stand for it, and the share of them where a
+# table may be off by more than a fiftieth of what it spans: beside steps.
+_PROBES = 2048
+_OFF = 0.02
+_HUGE = 1e30
 
 Function = Callable[..., np.ndarray]
 
@@ -71,7 +74,7 @@ class _Problem:
         numbers = np.random.default_rng(1)
         rows = [low + (high - low) * numbers.random((_PROBES, 3)) for low, high in self.domain]
         return [
-            row if value.kind != "float" else np.repeat(row[:, :1], 3, axis=1)
+            row if value.channel == "rgb" else np.repeat(row[:, :1], 3, axis=1)
             for row, value in zip(rows, self.of, strict=True)
         ]
 
@@ -130,7 +133,7 @@ def _multilinear(problem: _Problem) -> Value | None:
     sums = sum(c * p for c, p in zip(coefficients, _products(probes), strict=True))
     if not _alike(problem(*probes), np.asarray(sums)):
         return None
-    at = np.meshgrid(*problem.domain, indexing="ij")
+    at = np.meshgrid(*map(bounds, problem.of), indexing="ij")
     corners = problem(*(np.repeat(side.reshape(-1, 1), 3, axis=1) for side in at))
     reach = (float(corners.min()), float(corners.max()))
     return Composed(
@@ -166,13 +169,41 @@ def _table(problem: _Problem) -> Value | None:
         picture = values.reshape(_CUBE * _CUBE, _CUBE, 3)
         of = tuple(component(of[0], index) for index in range(3))
         domain = domain * 3
+        probes = [np.repeat(probes[0][:, [index]], 3, axis=1) for index in range(3)]
     else:
         return None
     reach = (float(picture.min()), float(picture.max()))
+    if max(-reach[0], reach[1], widest) > _HUGE or not _is_close(picture, domain, probes, found):
+        return None
     table = Baked(problem.name, picture.astype(np.float32))
     return Composed(
         problem.name, of, problem.kind, _channel(problem), reach, table=table, domain=tuple(domain)
     )
+
+
+def _is_close(
+    picture: np.ndarray,
+    domain: list[tuple[float, float]],
+    probes: list[np.ndarray],
+    found: np.ndarray,
+) -> bool:
+    """Whether a table, linear between its entries, is the function at nearly all probes."""
+    width = picture.shape[1]
+    rows = picture.shape[0] if len(domain) < 3 else width
+    sides, places = [width, rows, width][: len(domain)], []
+    for row, (low, high), side in zip(probes, domain, sides, strict=True):
+        places.append((row - low) / (high - low) * (side - 1))
+    told = np.zeros_like(found)
+    for corner in itertools.product((0, 1), repeat=len(domain)):
+        weight, entry = np.ones_like(found), np.zeros(found.shape, int)
+        for i, (place, side) in enumerate(zip(places, sides, strict=True)):
+            lower = np.clip(place.astype(int), 0, side - 2)
+            share = place - lower
+            weight *= share if corner[i] else 1.0 - share
+            entry += (lower + corner[i]) * (1, width, width * rows)[i]
+        told += weight * picture.reshape(-1, 3)[entry, [0, 1, 2]]
+    span = max(float(found.max() - found.min()), 1e-6)
+    return bool((np.abs(told - found) > _OFF * span).mean() <= _OFF)
 
 
 def _tabulated(problem: _Problem, side: int) -> np.ndarray:
@@ -209,7 +240,10 @@ def _split(problem: _Problem) -> Value | None:
         low, high = at(0.0), at(1.0)
         if not _alike(low + (high - low) * probes[i], found):
             continue
-        halves = [_composed(_without(problem, i, end)) for end in (0.0, 1.0)]
+        try:
+            halves = [_composed(_without(problem, i, end)) for end in (0.0, 1.0)]
+        except UnsupportedError:
+            continue
         between = _Problem(
             problem.name, problem.kind, lambda t, a, b: a + (b - a) * t, (value, *halves)
         )

@@ -113,17 +113,20 @@ class Evaluator:
         self, node: bpy.types.Node, kind: Kind, function: Callable[..., np.ndarray], *values: Value
     ) -> Value:
         """Apply `function` to values, or to their averages where that cannot be expressed."""
-        try:
-            return combine(node.name, kind, function, *values)
-        except UnsupportedError as reason:
-            problem = reason
-        if not self.world:
-            # what surrounds a scene is one picture
+        attempts = [combine, compose]
+        if self.world:
+            # What surrounds a scene is one picture.
+            attempts = [combine]
+        elif self.tells_object and not all(isinstance(value, Constant) for value in values):
+            # One picture for each object would be too much.
+            attempts = [compose, combine]
+        problem = ""
+        for attempt in attempts:
             try:
-                return compose(node.name, kind, function, *values)
+                return attempt(node.name, kind, function, *values)
             except UnsupportedError as reason:
-                problem = reason
-        self.simplify(node, str(problem), "averages are used")
+                problem = str(reason)
+        self.simplify(node, problem, "averages are used")
         return combine(node.name, kind, function, *(average(value) for value in values))
 
     def number(self, entry: bpy.types.NodeSocket, stack: Stack) -> float:

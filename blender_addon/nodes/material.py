@@ -70,14 +70,21 @@ class Translator:
             return result, False
         owner = f"Material '{material.name}'"
         evaluator = Evaluator(owner, self.textures, self._log, info=info)
-        # Blender 4.1 moved this from Cycles' settings.
-        cycles = getattr(material, "cycles", None)
-        method = getattr(material, "displacement_method", None) or cycles.displacement_method
+        method = material.displacement_method
         height = raised(evaluator, output)
         has_bumps = bool(height and method != "DISPLACEMENT" and isinstance(height["height"], dict))
         if height and method != "BUMP":
             result["displacement"] = {**height, "keeps_normals": has_bumps}
+        raising = set(self.textures.asked)
+        self.textures.asked.clear()
         result["surface"] = self._surface(evaluator, output, height if has_bumps else None)
+        spaces = {self.textures.projections[name].space for name in self.textures.asked}
+        if "displacement" in result and "object" in spaces:
+            self._log.warn(
+                f"{owner}: coordinates of a displaced object are not supported, "
+                "those before its displacement are used"
+            )
+        self.textures.asked |= raising
         inside = absorption(evaluator, socket(output, "Volume"))
         if inside.any():
             result["absorption"] = inside.tolist()

@@ -1,4 +1,7 @@
-"""Procedural textures: what repeats or ends is a picture, and noise looks one up."""
+"""Procedural textures.
+
+What repeats or ends is a picture, noise looks one up, cells and bricks are patterns of the engine.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import bpy
 import numpy as np
 
 from .coordinates import AS_IT_IS
-from .places import looked_up, turned
+from .places import as_value, length, looked_up, turned
 from .tree import Stack
 from .values import (
     Baked,
@@ -19,6 +22,7 @@ from .values import (
     Sampling,
     UnsupportedError,
     Value,
+    component,
     convert,
 )
 
@@ -30,6 +34,9 @@ _SQUARES = Baked("Checker", np.array([[[1.0], [0.0]], [[0.0], [1.0]]], np.float3
 
 # Texels of a picture of one row.
 _SIZE = 1024
+
+# Noise as it is.
+_RAMP = Baked("Noise", np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[None, :, None])
 
 # What gradients make of their coordinate from 0 to 1, and what that is of x, y, z and 1.
 _GRADIENTS = {
@@ -88,8 +95,17 @@ def _row(
     return ImageValue(picture, sampling, "float", "r")
 
 
-def _shown(value: ImageValue, output: bpy.types.NodeSocket) -> Value:
+def _shown(value: Value, output: bpy.types.NodeSocket) -> Value:
     return convert(value, "color") if output.identifier == "Color" else value
+
+
+def _where(ev: Evaluator, node: bpy.types.Node, stack: Stack) -> str | Value:
+    """The scaled place of a pattern: an attribute that holds it, or a value."""
+    place = _place(ev, node, stack)
+    scale = ev.number(node.inputs["Scale"], stack)
+    if isinstance(place, Coordinates):
+        return ev.textures.solid(place.scaled(scale))
+    return turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
 
 
 def checker(
@@ -111,7 +127,15 @@ def checker(
 def gradient(
     ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
 ) -> Value:
-    """Gradient Texture, but for the radial kinds."""
+    """Gradient Texture, but for the radial kind."""
+    if node.gradient_type in {"SPHERICAL", "QUADRATIC_SPHERE"}:
+        power = 2.0 if node.gradient_type == "QUADRATIC_SPHERE" else 1.0
+        distance = length(as_value(ev, _place(ev, node, stack)))
+
+        def fall(r: np.ndarray) -> np.ndarray:
+            return np.maximum(0.999999 - r, 0.0) ** power
+
+        return _shown(ev.combine(node, "float", fall, distance), output)
     if node.gradient_type not in _GRADIENTS:
         raise UnsupportedError(f"the {node.gradient_type.lower().replace('_', ' ')} gradient")
     curve, row = _GRADIENTS[node.gradient_type]
@@ -123,26 +147,63 @@ def gradient(
 
 
 def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Wave Texture of bands without distortion."""
-    if node.wave_type != "BANDS":
-        raise UnsupportedError("waves in rings")
-    if ev.value(node.inputs["Distortion"], stack) != Constant.number(0.0):
-        ev.simplify(node, "distortion", "even waves are used")
+    """Wave Texture."""
     steps = _steady(ev.number(node.inputs["Scale"], stack))
     phase = ev.number(node.inputs["Phase Offset"], stack)
-    turns = np.array([*_BANDS[node.bands_direction], phase]) / (2.0 * np.pi)
     values = _PROFILES[node.wave_profile]((np.arange(_SIZE) + 0.5) / _SIZE)
     place = _place(ev, node, stack)
-    return _shown(_row(ev, node, place, turns @ steps, values, "repeat"), output)
+    bent = ev.value(node.inputs["Distortion"], stack) != Constant.number(0.0)
+    if node.wave_type == "BANDS" and not bent:
+        turns = np.array([*_BANDS[node.bands_direction], phase]) / (2.0 * np.pi)
+        return _shown(_row(ev, node, place, turns @ steps, values, "repeat"), output)
+    # What has no attribute of its own is computed in place.
+    at = turned(ev, node, as_value(ev, place), steps)
+    if node.wave_type == "BANDS":
+        matrix = np.zeros((4, 4))
+        matrix[0, :3], matrix[3, 3] = _BANDS[node.bands_direction], 1.0
+        along = component(turned(ev, node, at, matrix), 0)
+    else:
+        kept = np.diag([float(axis != node.rings_direction) for axis in "XYZ"] + [1.0])
+        along = ev.combine(node, "float", lambda r: 20.0 * r, length(turned(ev, node, at, kept)))
+    added = _distortion(ev, node, stack, at) if bent else Constant.number(0.0)
+    turn = ev.combine(node, "float", lambda n, d: (n + d + phase) / (2.0 * np.pi), along, added)
+    row = ev.combine(
+        node,
+        "vector",
+        lambda t: np.concatenate([t, np.full_like(t, 0.5), np.zeros_like(t)], axis=-1),
+        turn,
+    )
+    if isinstance(row, Constant):
+        raise UnsupportedError("waves in one place")
+    picture = Baked("Waves", values.astype(np.float32)[None, :, None])
+    sampling = Sampling("uv", AS_IT_IS, "", "repeat", at=row)
+    return _shown(ImageValue(picture, sampling, "float", "r"), output)
 
 
-# What Blender's names of Voronoi features are, and how far each distance reaches, about, in cells.
+def _distortion(ev: Evaluator, node: bpy.types.Node, stack: Stack, at: Value) -> Value:
+    """What noise adds to the phase of waves."""
+    scale = ev.number(node.inputs["Detail Scale"], stack)
+    numbers = (
+        ev.number(node.inputs["Detail"], stack),
+        ev.number(node.inputs["Detail Roughness"], stack),
+        *(2.0, 0.0),
+    )
+    place = turned(ev, node, at, np.diag([scale, scale, scale, 1.0]))
+    strength = ImageValue(_RAMP, Sampling("noise", numbers, "", "clamp", at=place), "float", "r")
+    distortion = ev.value(node.inputs["Distortion"], stack)
+    return ev.combine(node, "float", lambda d, n: d * (2.0 * n - 1.0), distortion, strength)
+
+
+# What Blender's names of Voronoi features are, and how far each reaches along an axis, in cells.
 _FEATURES = {
-    "F1": ("f1", 1.5),
-    "F2": ("f2", 2.0),
-    "SMOOTH_F1": ("smooth_f1", 1.5),
+    "F1": ("f1", 1.0),
+    "F2": ("f2", 1.5),
+    "SMOOTH_F1": ("smooth_f1", 1.0),
     "DISTANCE_TO_EDGE": ("distance_to_edge", 1.0),
 }
+
+# The powers by which Blender's metrics measure.
+_POWERS = {"EUCLIDEAN": 2.0, "MANHATTAN": 1.0, "CHEBYCHEV": np.inf}
 
 # Inputs of Voronoi Texture; each feature and metric has those that it needs.
 _CELL_INPUTS = ("Detail", "Roughness", "Lacunarity", "Smoothness", "Exponent", "Randomness")
@@ -156,7 +217,7 @@ def voronoi(
         raise UnsupportedError(f"cells in {node.voronoi_dimensions}")
     if node.feature not in _FEATURES or output.identifier not in {"Distance", "Color"}:
         raise UnsupportedError(f"the output '{output.name}'")
-    feature, reach = _FEATURES[node.feature]
+    feature, cells = _FEATURES[node.feature]
     entries = {name: node.inputs.get(name) for name in _CELL_INPUTS}
     numbers = {
         name.lower(): ev.number(entry, stack)
@@ -168,6 +229,8 @@ def voronoi(
     colored = output.identifier == "Color"
     normalized = bool(getattr(node, "normalize", False))
     octaves = 1.0 + numbers.get("detail", 0.0)
+    if bpy.app.version < (5, 0, 0):
+        ev.simplify(node, "the pattern of this Blender", "that of Blender 5.0 is used")
     data = {
         "type": "cells",
         "colored": colored,
@@ -178,16 +241,53 @@ def voronoi(
             **numbers,
         },
     }
-    place = _place(ev, node, stack)
-    scale = ev.number(node.inputs["Scale"], stack)
-    where: str | Value
-    if isinstance(place, Coordinates):
-        where = ev.textures.solid(place.scaled(scale))
-    else:
-        where = turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
-    most = 1.0 if normalized else octaves if colored else reach * octaves
+    where = _where(ev, node, stack)
+    power = _POWERS.get(node.distance, max(numbers.get("exponent", 0.5), 0.01))
+    reach = 1.0 if colored else cells * min(3.0 ** (1.0 / power), 100.0)
+    most = 1.0 if normalized else reach * octaves
     kind, channel = ("color", "rgb") if colored else ("float", "r")
-    return PatternValue("Voronoi", data, where, (0.0, most), kind, channel)
+    return PatternValue("Voronoi", data, {"place": where}, (0.0, most), kind, channel)
+
+
+def bricks(
+    ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
+) -> Value:
+    """Brick Texture."""
+    numbers = {
+        key: ev.number(node.inputs[name], stack)
+        for key, name in (
+            ("width", "Brick Width"),
+            ("height", "Row Height"),
+            ("mortar", "Mortar Size"),
+            ("smooth", "Mortar Smooth"),
+            ("bias", "Bias"),
+        )
+    }
+    if min(numbers["width"], numbers["height"], node.squash) <= 0.0:
+        raise UnsupportedError("a wall of bricks without size")
+    data = {
+        "type": "bricks",
+        "bricks": {
+            **numbers,
+            "offset": node.offset,
+            "offset_frequency": node.offset_frequency,
+            "squash": node.squash,
+            "squash_frequency": node.squash_frequency,
+        },
+    }
+    where = {"place": _where(ev, node, stack)}
+    mortar, tint = (
+        PatternValue("Bricks", data, where, (0.0, 1.0), "float", channel) for channel in "rg"
+    )
+    if output.identifier != "Color":
+        return mortar
+    first, second, joint = ev.inputs(node, stack, "Color1", "Color2", "Mortar")
+
+    def between(t: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return a + (b - a) * t
+
+    brick = ev.combine(node, "color", between, tint, first, second)
+    return ev.combine(node, "color", between, mortar, brick, joint)
 
 
 def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
@@ -211,5 +311,4 @@ def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, sta
     else:
         scaled = turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
         sampling = Sampling(space, numbers, "", "clamp", at=scaled)
-    ramp = Baked("Noise", np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[None, :, None])
-    return ImageValue(ramp, sampling, *(("color", "rgb") if colored else ("float", "r")))
+    return ImageValue(_RAMP, sampling, *(("color", "rgb") if colored else ("float", "r")))

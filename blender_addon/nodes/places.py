@@ -9,13 +9,24 @@ import numpy as np
 
 from .coordinates import coordinates, mapping, origin
 from .tree import Source, Stack, resolve
-from .values import Constant, Coordinates, PlaceValue, UnsupportedError, Value, component, lookups
+from .values import (
+    FAR,
+    Constant,
+    Coordinates,
+    PatternValue,
+    PlaceValue,
+    UnsupportedError,
+    Value,
+    bounds,
+    component,
+    lookups,
+)
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator
 
-# Textures that may be looked up for a place: what is looked up there has room for some more.
-_MOST_LOOKUPS = 128
+# Textures that may be looked up for a place: turned, it looks up each component.
+_MOST_LOOKUPS = 60
 
 
 def given(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
@@ -23,7 +34,7 @@ def given(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, sta
     if ev.world:
         raise UnsupportedError(f"the output '{output.name}'")
     space, uv = origin(Source(stack, node=node, output=output), world=False)
-    return PlaceValue(Coordinates(space, uv, np.eye(4)))
+    return as_value(ev, Coordinates(space, uv, np.eye(4)))
 
 
 def mapped(
@@ -37,11 +48,29 @@ def turned(ev: Evaluator, node: bpy.types.Node, vector: Value, matrix: np.ndarra
     """A vector by a 4x4 matrix."""
     if isinstance(vector, Constant):
         return Constant.vector(matrix[:3, :3] @ vector.rgb + matrix[:3, 3])
+    if isinstance(vector, PlaceValue) and vector.channel == "rgb":
+        return PlaceValue(vector.place.by(matrix), vector.extent)
 
     def apply(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         return np.concatenate([x, y, z], axis=-1) @ matrix[:3, :3].T + matrix[:3, 3]
 
     return ev.combine(node, "vector", apply, *(component(vector, index) for index in range(3)))
+
+
+def as_value(ev: Evaluator, place: Coordinates | Value) -> Value:
+    """Coordinates as numbers."""
+    if not isinstance(place, Coordinates):
+        return place
+    return PlaceValue(place, ev.textures.extent if place.space == "object" else FAR)
+
+
+def length(vector: Value) -> Value:
+    """The length of a vector."""
+    if isinstance(vector, Constant):
+        return Constant.number(float(np.linalg.norm(vector.rgb)))
+    most = float(np.sqrt(3.0) * np.abs(bounds(vector)).max())
+    data = {"type": "length"}
+    return PatternValue("Length", data, {"of": vector}, (0.0, most), "float", "r")
 
 
 def looked_up(

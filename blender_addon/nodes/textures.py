@@ -42,6 +42,7 @@ class BlenderSource:
         self._straight = straight_alpha
         self._log = log
         self._pixels: Pixels | None = None
+        self._reach: tuple[float, float] | None = None
 
     def pixels(self) -> Pixels:
         """The pixels as Blender stores them; magenta for an image that cannot be read."""
@@ -58,9 +59,11 @@ class BlenderSource:
 
     def reach(self) -> tuple[float, float]:
         """See `ImageSource`."""
-        values = self.pixels().values
-        most = 255.0 if values.dtype == np.uint8 else 1.0
-        return float(values.min()) / most, float(values.max()) / most
+        if self._reach is None:
+            values = self.pixels().values
+            most = 255.0 if values.dtype == np.uint8 else 1.0
+            self._reach = float(values.min()) / most, float(values.max()) / most
+        return self._reach
 
 
 class TextureStore:
@@ -72,6 +75,8 @@ class TextureStore:
         self._sources: dict[tuple[int, bool], BlenderSource] = {}
         self._images: dict[int, tuple[ImageSource, int]] = {}
         self._textures: dict[str, int] = {}
+        #: How far meshes reach from their origins.
+        self.extent = 1.0
         # Attributes of meshes that are read as UV maps, and what is read of others, by the names
         # that the scene knows it by.
         self.uvs: set[str] = set()
@@ -145,11 +150,12 @@ class TextureStore:
             name = self.solid(value.place)
             data = {"type": "attribute", "name": name, "default": [0.0, 0.0, 0.0, 1.0]}
         elif isinstance(value, PatternValue):
-            name, place = value.name, value.place
-            data = {
-                **value.data,
-                "place": place if isinstance(place, str) else self.json(place, "vector"),
+            name = value.name
+            inputs = {
+                key: of if isinstance(of, str) else self.json(of, of.kind)
+                for key, of in value.inputs.items()
             }
+            data = value.data | inputs
         elif isinstance(value, AttributeValue):
             name = self._reading(value)
             default = [*value.matrix[:, 3].tolist(), 1.0]

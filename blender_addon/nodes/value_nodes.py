@@ -12,8 +12,8 @@ from . import operators
 from .arithmetic import pick
 from .coordinates import AS_IT_IS, equirectangular
 from .curves import float_curve, rgb_curves
-from .patterns import checker, gradient, noise, voronoi, wave
-from .places import given, looked_up, mapped
+from .patterns import bricks, checker, gradient, noise, voronoi, wave
+from .places import given, length, looked_up, mapped
 from .tree import Stack, is_linked
 from .values import (
     KINDS,
@@ -112,6 +112,8 @@ def _attribute(
     ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
 ) -> Value:
     """Attribute and Color Attribute."""
+    if ev.world:
+        raise UnsupportedError(f"the output '{output.name}'")
     if node.bl_idname == "ShaderNodeVertexColor":
         name = node.layer_name
         if not name:
@@ -122,7 +124,8 @@ def _attribute(
             raise UnsupportedError(f"an attribute of type {node.attribute_type.lower()}")
     factor = output.identifier == "Fac"
     channel = "a" if output.identifier == "Alpha" else "r" if factor else "rgb"
-    return AttributeValue(name, KINDS[output.type], channel, factor)
+    is_color = node.bl_idname == "ShaderNodeVertexColor"
+    return AttributeValue(name, KINDS[output.type], channel, factor, is_color=is_color)
 
 
 def _math(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
@@ -149,6 +152,13 @@ def _vector_math(
         return ev.combine(
             node, "vector", operators.MATH[operators.VECTOR_BY_COMPONENT[operation]], *values[:3]
         )
+    if operation in {"LENGTH", "DISTANCE"}:
+        subtract = operators.MATH["SUBTRACT"]
+        vector = values[0]
+        if operation == "DISTANCE":
+            vector = ev.combine(node, "vector", subtract, *values[:2], Constant.number(0.0))
+        if not isinstance(vector, ImageValue | AttributeValue):
+            return length(vector)
     if operation in operators.VECTOR_TO_FLOAT:
         return ev.combine(node, "float", operators.VECTOR_TO_FLOAT[operation], *values)
     if operation in operators.VECTOR:
@@ -301,6 +311,7 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _image,
     "ShaderNodeVertexColor": _attribute,
+    "ShaderNodeTexBrick": bricks,
     "ShaderNodeTexChecker": checker,
     "ShaderNodeTexGradient": gradient,
     "ShaderNodeTexNoise": noise,

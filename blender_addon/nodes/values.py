@@ -142,7 +142,7 @@ class AttributeValue:
     """An attribute of the mesh, such as vertex colours; with `factor` as one number.
 
     How many components become that number, each mesh knows for itself. `affine`: the three rows of
-    a 3x4 matrix that is applied to what is read.
+    a 3x4 matrix that is applied to what is read. `is_color`: what is read stays between 0 and 1.
     """
 
     name: str
@@ -150,6 +150,7 @@ class AttributeValue:
     channel: str = "rgb"
     factor: bool = False
     affine: tuple[float, ...] = _IDENTITY
+    is_color: bool = False
 
     @property
     def matrix(self) -> np.ndarray:
@@ -159,23 +160,25 @@ class AttributeValue:
 
 @dataclass(frozen=True, eq=False)
 class PlaceValue:
-    """Texture coordinates as three numbers."""
+    """Texture coordinates as three numbers, from -`extent` to `extent` if not from 0 to 1."""
 
     place: Coordinates
+    extent: float
     kind: Kind = "vector"
     channel: str = "rgb"
 
 
 @dataclass(frozen=True, eq=False)
 class PatternValue:
-    """A pattern that is computed where it is looked up: keys of the ABI's texture but `place`.
+    """A pattern that is computed where it is looked up: keys of the ABI's texture.
 
-    `place`: an attribute or a value. `reach`: between what the pattern stays.
+    `inputs`: those among them that are values, or attributes by name. `reach`: between what the
+    pattern stays.
     """
 
     name: str
     data: dict[str, Any]
-    place: str | Value
+    inputs: dict[str, str | Value]
     reach: tuple[float, float]
     kind: Kind
     channel: str
@@ -213,11 +216,11 @@ class Composed:
 Texture = ImageValue | AttributeValue | PlaceValue | PatternValue | Composed
 Value = Constant | Texture
 
-# What the ABI allows.
-_MOST_LOOKUPS = 256
+# The ABI allows 256, of which what is looked up by a value takes some more.
+_MOST_LOOKUPS = 192
 
-# Between which numbers coordinates are expected that have no bounds of their own.
-_FAR = 16.0
+#: How far from 0 attributes that are no colours, and UV maps, are expected.
+FAR = 16.0
 
 
 def lookups(value: Value) -> int:
@@ -226,8 +229,8 @@ def lookups(value: Value) -> int:
         return value.lookups
     if isinstance(value, ImageValue) and value.sampling.at is not None:
         return 1 + lookups(value.sampling.at)
-    if isinstance(value, PatternValue) and not isinstance(value.place, str):
-        return 1 + lookups(value.place)
+    if isinstance(value, PatternValue):
+        return 1 + sum(lookups(of) for of in value.inputs.values() if not isinstance(of, str))
     return 1
 
 
@@ -276,20 +279,43 @@ def convert(value: Value, kind: Kind) -> Value:
 
 
 def bounds(value: Value) -> tuple[float, float]:
-    """Between which numbers a value stays. Attributes of meshes are taken to be colours."""
+    """Between which numbers a value stays; of what meshes have, where it is expected."""
     if isinstance(value, Constant):
         return min(value.rgb), max(value.rgb)
     if isinstance(value, AttributeValue):
-        return 0.0, 1.0
+        return _mapped((0.0, 1.0) if value.is_color else (-FAR, FAR), value.matrix)
     if isinstance(value, PlaceValue):
-        return (0.0, 1.0) if value.place.space == "generated" else (-_FAR, _FAR)
+        is_unit = value.place.space == "generated"
+        ends = (0.0, 1.0) if is_unit else (-value.extent, value.extent)
+        return _mapped(ends, value.place.matrix[:3])
     if isinstance(value, PatternValue | Composed):
         return value.reach
     ends = [value.gain * end for end in value.source.reach()]
     return min(ends), max(ends)
 
 
-def component(value: Texture, index: int) -> Value:
+def _mapped(ends: tuple[float, float], matrix: np.ndarray) -> tuple[float, float]:
+    """Between which numbers three rows of a 3x4 matrix bring three components."""
+    low, high = ends
+    middle = matrix @ [*[(low + high) / 2.0] * 3, 1.0]
+    reach = np.abs(matrix[:, :3]).sum(axis=1) * (high - low) / 2.0
+    return float((middle - reach).min()), float((middle + reach).max())
+
+
+def is_negative(value: Value) -> bool:
+    """Whether a value is below 0 somewhere; attributes of meshes are not taken to be."""
+    return not _is_of_meshes(value) and bounds(value)[0] < 0.0
+
+
+def _is_of_meshes(value: Value) -> bool:
+    if isinstance(value, Composed):
+        return any(map(_is_of_meshes, value.of))
+    return isinstance(value, AttributeValue | PlaceValue)
+
+
+def component(value: Value, index: int) -> Value:
     """A component of a colour or vector."""
+    if isinstance(value, Constant):
+        return Constant.number(value.rgb[index])
     channel = "rgb"[index] if value.channel == "rgb" else value.channel
     return replace(value, kind="float", channel=channel)

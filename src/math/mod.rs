@@ -1,5 +1,6 @@
 //! Frames, warps, random sequences, colour, tabulated distributions, compact codes. `glam` types throughout.
 
+pub mod bricks;
 pub mod cells;
 pub mod color;
 pub mod density;

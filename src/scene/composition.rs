@@ -102,6 +102,8 @@ fn lookups(texture: &Texture, all: &[Texture]) -> usize {
         Texture::Multilinear(t) => t.of.as_slice(),
         Texture::Table(t) => t.of.as_slice(),
         Texture::Image(t) => t.at.as_slice(),
+        Texture::Length(of) => std::slice::from_ref(of),
+        Texture::Bricks(t) => t.place.value().map(std::slice::from_ref).unwrap_or_default(),
         Texture::Cells(t) => t.place.value().map(std::slice::from_ref).unwrap_or_default(),
         Texture::Noise(t) => t.place.value().map(std::slice::from_ref).unwrap_or_default(),
         Texture::Constant(_) | Texture::Attribute { .. } => &[],

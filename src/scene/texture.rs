@@ -3,6 +3,7 @@
 use super::composition::{self, Multilinear, MultilinearJson, Table, TableJson};
 use super::value::Value;
 use super::{Image, SceneError};
+use crate::math::bricks::Bricks;
 use crate::math::cells::Cells;
 use crate::math::noise::Fractal;
 use glam::{Affine2, Mat2, Vec2, Vec4};
@@ -56,7 +57,7 @@ pub struct ImageTexture {
     pub bias: Vec4,
 }
 
-/// Where noise is looked up.
+/// Where noise and other patterns are looked up.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged)]
 pub enum Place {
@@ -107,6 +108,17 @@ pub struct CellTexture {
     pub colored: bool,
 }
 
+/// Walls of bricks by a place: mortar in the first component, the bricks' random numbers in the second.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BrickTexture {
+    /// The place.
+    pub place: Place,
+    /// The wall.
+    #[serde(default)]
+    pub bricks: Bricks,
+}
+
 /// A texture: a function of the surface point with an RGBA value.
 #[derive(Clone, Debug)]
 pub enum Texture {
@@ -118,6 +130,10 @@ pub enum Texture {
     Noise(Box<NoiseTexture>),
     /// Cellular noise.
     Cells(Box<CellTexture>),
+    /// A wall of bricks.
+    Bricks(Box<BrickTexture>),
+    /// The length of a vector.
+    Length(Value),
     /// A colour attribute of the mesh, or `default` where the mesh has none of that name.
     Attribute {
         /// Name of the attribute.
@@ -175,6 +191,10 @@ enum Json {
         bias: [f32; 4],
     },
     Cells(Box<CellTexture>),
+    Bricks(Box<BrickTexture>),
+    Length {
+        of: Value,
+    },
     Attribute {
         name: String,
         default: [f32; 4],
@@ -274,6 +294,19 @@ impl Texture {
                 c.detail = c.detail.clamp(0.0, MOST_DETAIL);
                 c.roughness = c.roughness.clamp(0.0, 1.0);
                 Ok(Self::Cells(texture))
+            }
+            Json::Bricks(texture) => {
+                check_place(&texture.place)?;
+                let b = &texture.bricks;
+                finite("bricks", &[b.width, b.height, b.mortar, b.smooth, b.bias, b.offset, b.squash])?;
+                if !(b.width > 0.0 && b.height > 0.0 && b.squash > 0.0) {
+                    return Err(fail("bricks have no width or no height".into()));
+                }
+                Ok(Self::Bricks(texture))
+            }
+            Json::Length { of } => {
+                composition::check(std::slice::from_ref(&of), name, before)?;
+                Ok(Self::Length(of))
             }
             Json::Attribute { name: attribute, default } => {
                 finite("default", &default)?;

@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Barycentrics of a triangle's corners.
 const CORNERS: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::Y];
 
-/// The scene with its displaced meshes. Those that stand somewhere with other materials are there twice.
+/// The scene with its displaced meshes. Those that stand somewhere with another displacement are there twice.
 pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene> {
     let moves = |group: &InstanceGroup| {
         group.materials.iter().any(|&m| scene.materials[m as usize].displacement.is_some())
@@ -31,10 +31,15 @@ pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene
     }
     let textures = TextureSet::new(scene.clone());
     let mut result = Scene::clone(&scene);
-    let mut made: BTreeMap<(u32, &[u32]), u32> = BTreeMap::new();
+    let displacements = |group: &InstanceGroup| -> Vec<String> {
+        let of_material = |&m: &u32| format!("{:?}", scene.materials[m as usize].displacement);
+        group.materials.iter().map(of_material).collect()
+    };
+    // by mesh and by what displaces it: colours may differ
+    let mut made: BTreeMap<(u32, Vec<String>), u32> = BTreeMap::new();
     for (k, group) in scene.groups.iter().enumerate() {
         let Some(&to_world) = stands.get(&(k as u32)) else { continue };
-        let mesh = *made.entry((group.mesh, group.materials.as_slice())).or_insert_with(|| {
+        let mesh = *made.entry((group.mesh, displacements(group))).or_insert_with(|| {
             let (mesh, bad) = displace(&scene, &textures, group, to_world);
             if bad > 0 {
                 let what = "vertices with a displacement that is not finite stay where they are";

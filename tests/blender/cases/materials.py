@@ -510,6 +510,15 @@ def case_displacement() -> None:
         tree.tree.links.remove(raised.inputs["Height"].links[0])
     tree.link(image.outputs["Color"], raised.inputs["Height"])
     tree.material.displacement_method = "BUMP"
+    # Colours by the height that it is raised to are those from before.
+    tree.material.displacement_method = "DISPLACEMENT"
+    place, ramp = tree.node("TexCoord"), tree.node("SeparateXYZ")
+    tree.link(place.outputs["Object"], ramp.inputs[0])
+    tree.link(ramp.outputs["Z"], cover.inputs["Color"])
+    _, warnings = builders.export()
+    assert len(warnings) == 1 and "before its displacement" in warnings[0], warnings
+    tree.tree.links.remove(cover.inputs["Color"].links[0])
+    tree.material.displacement_method = "BUMP"
     # A bump map is raised over it, a normal map takes its place.
     bump, waves = tree.node("Bump"), tree.node("TexWave")
     tree.link(waves.outputs[0], bump.inputs["Height"])

@@ -165,16 +165,17 @@ def case_checkers_in_space_are_named() -> None:
 def case_patterns_without_a_counterpart_are_named() -> None:
     tree = Tree()
     for kind, properties, inputs in (
-        ("TexGradient", {"gradient_type": "SPHERICAL"}, {}),
-        ("TexWave", {"wave_type": "RINGS"}, {}),
-        ("TexWave", {}, {"Distortion": 2.0}),
+        ("TexGradient", {"gradient_type": "RADIAL"}, {}),
+        ("TexBrick", {}, {"Brick Width": 0.0}),
         ("TexNoise", {"noise_dimensions": "4D"}, {}),
         ("TexVoronoi", {"voronoi_dimensions": "4D"}, {}),
         ("TexVoronoi", {"feature": "DISTANCE_TO_EDGE"}, {"Detail": 1.0}),
         ("TexMagic", {}, {}),
     ):
         shader = tree.surface(tree.node("BsdfDiffuse"))
-        texture = tree.node(kind, **inputs)
+        texture = tree.node(kind)
+        for key, value in inputs.items():
+            texture.inputs[key].default_value = value
         for key, value in properties.items():
             setattr(texture, key, value)
         tree.link(next(o for o in texture.outputs if o.enabled), shader.inputs["Color"])
@@ -309,7 +310,7 @@ def case_functions_of_several_textures() -> None:
         mix = tree.node("MixRGB")
         mix.blend_type = blend
         for noise, entry in zip(_noises(tree, 3), mix.inputs, strict=True):
-            tree.link(noise.outputs[0], entry)
+            tree.link(noise.outputs["Color" if kinds is None else "Fac"], entry)
         shader = tree.surface(tree.node("BsdfDiffuse"))
         tree.link(mix.outputs[0], shader.inputs["Color"])
         surface, scene, warnings = tree.export()
@@ -347,3 +348,41 @@ def case_mixes_of_too_many_textures_are_named() -> None:
         tree.link(noise.outputs[0], entry)
     tree.link(spread.outputs[0], shader.inputs["Roughness"])
     assert any("5 textures at once" in text for text in tree.export()[2])
+
+
+def case_functions_that_no_table_holds_are_named() -> None:
+    """Steeper and finer than the entries of a table, and beyond single precision."""
+    for operation, factor in (("FRACT", 5000.0), ("EXPONENT", 90.0)):
+        tree = Tree()
+        place, parts = tree.node("TexCoord"), tree.node("SeparateXYZ")
+        scale, steep = tree.node("Math"), tree.node("Math")
+        scale.operation, steep.operation = "MULTIPLY", operation
+        scale.inputs[1].default_value = factor
+        tree.link(place.outputs["Object"], parts.inputs[0])
+        tree.link(parts.outputs["Z"], scale.inputs[0])
+        tree.link(scale.outputs[0], steep.inputs[0])
+        shader = tree.surface(tree.node("BsdfDiffuse"))
+        tree.link(steep.outputs[0], shader.inputs["Roughness"])
+        _, _, warnings = tree.export()
+        assert any("averages are used" in text for text in warnings), (operation, warnings)
+        bpy.data.objects.remove(tree.item)
+        bpy.data.materials.remove(tree.material)
+
+
+def case_clamps_of_coordinates_and_attributes_hold_beyond_one() -> None:
+    """A clamp does nothing between 0 and 1, where coordinates are not."""
+    for source, output in (("TexCoord", "Object"), ("Attribute", "Vector")):
+        tree = Tree()
+        place, parts, clamp = tree.node(source), tree.node("SeparateXYZ"), tree.node("Clamp")
+        if source == "Attribute":
+            place.attribute_name = "Far"
+            tree.item.data.attributes.new("Far", "FLOAT_VECTOR", "POINT")
+        tree.link(place.outputs[output], parts.inputs[0])
+        tree.link(parts.outputs["Z"], clamp.inputs["Value"])
+        shader = tree.surface(tree.node("BsdfDiffuse"))
+        tree.link(clamp.outputs[0], shader.inputs["Roughness"])
+        surface, scene, warnings = tree.export()
+        texture = scene.textures[surface["roughness"]["texture"]][1]
+        assert not warnings and texture["type"] == "table", (source, texture, warnings)
+        bpy.data.objects.remove(tree.item)
+        bpy.data.materials.remove(tree.material)
