@@ -82,15 +82,20 @@ def average(value: Value) -> Constant:
     return replace(Constant.color(mean), kind=value.kind)
 
 
+def products(values: list[np.ndarray]) -> list[np.ndarray]:
+    """The products of all subsets of values, in the order of `Composed`'s coefficients."""
+    ones = np.ones_like(values[0])
+    return [
+        np.prod([ones, *(v for i, v in enumerate(values) if subset >> i & 1)], axis=0)
+        for subset in range(1 << len(values))
+    ]
+
+
 def _average_of_composed(value: Composed) -> Constant:
     """A sum of products by its values' averages; of a table the mean of all entries."""
     means = [np.array(average(of).rgb) for of in value.of]
     if value.coefficients is not None:
-        products = [
-            np.prod([np.ones(3), *(m for i, m in enumerate(means) if subset >> i & 1)], axis=0)
-            for subset in range(len(value.coefficients))
-        ]
-        found = (value.coefficients * products).sum(axis=0)
+        found = (value.coefficients * products(means)).sum(axis=0)
     else:
         assert value.table is not None
         found = value.table.values.mean(axis=(0, 1))

@@ -11,10 +11,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from .arithmetic import array
+from .arithmetic import array, products
 from .values import (
     Baked,
     Composed,
@@ -63,12 +64,13 @@ class _Problem:
         found = np.broadcast_to(np.asarray(found, np.float64), (1, len(inputs[0]), found.shape[-1]))
         return np.broadcast_to(found[0], (len(inputs[0]), 3))
 
-    @property
+    @cached_property
     def domain(self) -> list[tuple[float, float]]:
         """Of each input, at least from 0 to 1."""
         found = [bounds(value) for value in self.of]
         return [(min(low, 0.0), max(high, 1.0)) for low, high in found]
 
+    @cached_property
     def probes(self) -> list[np.ndarray]:
         """Points all over the domain, the same every time."""
         numbers = np.random.default_rng(1)
@@ -77,6 +79,11 @@ class _Problem:
             row if value.channel == "rgb" else np.repeat(row[:, :1], 3, axis=1)
             for row, value in zip(rows, self.of, strict=True)
         ]
+
+    @cached_property
+    def found(self) -> np.ndarray:
+        """What the function is there."""
+        return self(*self.probes)
 
 
 def _alike(a: np.ndarray, b: np.ndarray) -> bool:
@@ -105,33 +112,18 @@ def _composed(problem: _Problem) -> Value:
     raise UnsupportedError("arithmetic of this kind on several textures")
 
 
-def _subsets(count: int) -> range:
-    return range(1 << count)
-
-
-def _products(inputs: list[np.ndarray]) -> list[np.ndarray]:
-    """The products of every subset of inputs, in the order of `segue`'s coefficients."""
-    ones = np.ones_like(inputs[0])
-    return [
-        np.prod([ones, *(row for i, row in enumerate(inputs) if subset >> i & 1)], axis=0)
-        for subset in _subsets(len(inputs))
-    ]
-
-
 def _multilinear(problem: _Problem) -> Value | None:
     count = len(problem.of)
-    ends = [
-        np.array([[float(subset >> i & 1)] * 3 for subset in _subsets(count)]) for i in range(count)
-    ]
+    subsets = range(1 << count)
+    ends = [np.array([[float(subset >> i & 1)] * 3 for subset in subsets]) for i in range(count)]
     coefficients = problem(*ends).copy()
     # From the values at the corners to the factors of products: differences along each input.
     for i in range(count):
-        for subset in _subsets(count):
+        for subset in subsets:
             if subset >> i & 1:
                 coefficients[subset] -= coefficients[subset ^ (1 << i)]
-    probes = problem.probes()
-    sums = sum(c * p for c, p in zip(coefficients, _products(probes), strict=True))
-    if not _alike(problem(*probes), np.asarray(sums)):
+    sums = sum(c * p for c, p in zip(coefficients, products(problem.probes), strict=True))
+    if not _alike(problem.found, np.asarray(sums)):
         return None
     at = np.meshgrid(*map(bounds, problem.of), indexing="ij")
     corners = problem(*(np.repeat(side.reshape(-1, 1), 3, axis=1) for side in at))
@@ -149,8 +141,7 @@ def _table(problem: _Problem) -> Value | None:
     of, domain = problem.of, problem.domain
     if len(of) > 2:
         return None
-    probes = problem.probes()
-    found = problem(*probes)
+    probes, found = problem.probes, problem.found
     alone = np.stack(
         [problem(*(np.repeat(row[:, [c]], 3, axis=1) for row in probes))[:, c] for c in range(3)],
         axis=-1,
@@ -229,8 +220,7 @@ def _split(problem: _Problem) -> Value | None:
     """Between what the function is at 0 and at 1 of an input in which it is linear."""
     if len(problem.of) < 2:
         return None
-    probes = problem.probes()
-    found = problem(*probes)
+    probes, found = problem.probes, problem.found
     for i, value in enumerate(problem.of):
 
         def at(end: float, i: int = i) -> np.ndarray:

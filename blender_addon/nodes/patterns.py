@@ -24,6 +24,7 @@ from .values import (
     Value,
     component,
     convert,
+    scaling,
 )
 
 if TYPE_CHECKING:
@@ -71,9 +72,9 @@ def _place(ev: Evaluator, node: bpy.types.Node, stack: Stack) -> Coordinates | V
 
 def _steady(scale: float) -> np.ndarray:
     """Scales, and moves as Cycles does it to keep whole numbers from flickering."""
-    result = np.diag([scale, scale, scale, 1.0])
+    result = scaling(scale)
     result[:3, 3] = 1e-6
-    return np.diag([0.999999] * 3 + [1.0]) @ result
+    return scaling(0.999999) @ result
 
 
 def _row(
@@ -105,7 +106,7 @@ def _where(ev: Evaluator, node: bpy.types.Node, stack: Stack) -> str | Value:
     scale = ev.number(node.inputs["Scale"], stack)
     if isinstance(place, Coordinates):
         return ev.textures.solid(place.scaled(scale))
-    return turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
+    return turned(ev, node, place, scaling(scale))
 
 
 def checker(
@@ -167,16 +168,11 @@ def wave(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stac
         along = ev.combine(node, "float", lambda r: 20.0 * r, length(turned(ev, node, at, kept)))
     added = _distortion(ev, node, stack, at) if bent else Constant.number(0.0)
     turn = ev.combine(node, "float", lambda n, d: (n + d + phase) / (2.0 * np.pi), along, added)
-    row = ev.combine(
-        node,
-        "vector",
-        lambda t: np.concatenate([t, np.full_like(t, 0.5), np.zeros_like(t)], axis=-1),
-        turn,
-    )
-    if isinstance(row, Constant):
+    if isinstance(turn, Constant):
         raise UnsupportedError("waves in one place")
     picture = Baked("Waves", values.astype(np.float32)[None, :, None])
-    sampling = Sampling("uv", AS_IT_IS, "", "repeat", at=row)
+    # Of a single row the height does not matter.
+    sampling = Sampling("uv", AS_IT_IS, "", "repeat", at=convert(turn, "vector"))
     return _shown(ImageValue(picture, sampling, "float", "r"), output)
 
 
@@ -188,7 +184,7 @@ def _distortion(ev: Evaluator, node: bpy.types.Node, stack: Stack, at: Value) ->
         ev.number(node.inputs["Detail Roughness"], stack),
         *(2.0, 0.0),
     )
-    place = turned(ev, node, at, np.diag([scale, scale, scale, 1.0]))
+    place = turned(ev, node, at, scaling(scale))
     strength = ImageValue(_RAMP, Sampling("noise", numbers, "", "clamp", at=place), "float", "r")
     distortion = ev.value(node.inputs["Distortion"], stack)
     return ev.combine(node, "float", lambda d, n: d * (2.0 * n - 1.0), distortion, strength)
@@ -298,17 +294,15 @@ def noise(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, sta
         raise UnsupportedError(f"{node.noise_type.lower().replace('_', ' ')} noise")
     if not getattr(node, "normalize", True):
         raise UnsupportedError("noise that is not normalized")
-    place = _place(ev, node, stack)
-    scale = ev.number(node.inputs["Scale"], stack)
+    where = _where(ev, node, stack)
     colored = output.identifier == "Color"
     space = "colored noise" if colored else "noise"
     numbers = tuple(
         ev.number(node.inputs[name], stack)
         for name in ("Detail", "Roughness", "Lacunarity", "Distortion")
     )
-    if isinstance(place, Coordinates):
-        sampling = Sampling(space, numbers, ev.textures.solid(place.scaled(scale)), "clamp")
+    if isinstance(where, str):
+        sampling = Sampling(space, numbers, where, "clamp")
     else:
-        scaled = turned(ev, node, place, np.diag([scale, scale, scale, 1.0]))
-        sampling = Sampling(space, numbers, "", "clamp", at=scaled)
+        sampling = Sampling(space, numbers, "", "clamp", at=where)
     return ImageValue(_RAMP, sampling, *(("color", "rgb") if colored else ("float", "r")))

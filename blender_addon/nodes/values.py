@@ -69,6 +69,11 @@ class Constant:
         return replace(Constant.color(values), kind="vector")
 
 
+def scaling(factor: float) -> np.ndarray:
+    """The 4x4 matrix that scales places."""
+    return np.diag([factor, factor, factor, 1.0])
+
+
 @dataclass(frozen=True)
 class Coordinates:
     """`matrix` (4x4) times a UV map, times where a point of the mesh is, or times a direction.
@@ -86,7 +91,7 @@ class Coordinates:
 
     def scaled(self, factor: float) -> Coordinates:
         """The same times a number."""
-        return self.by(np.diag([factor, factor, factor, 1.0]))
+        return self.by(scaling(factor))
 
     def along(self, row: Sequence[float]) -> Coordinates:
         """`row` (4) times these, as the first coordinate; the others are constant."""

@@ -262,11 +262,7 @@ impl Near {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::sampler::hash_unit;
-
-    fn place(i: u32) -> Vec3 {
-        Vec3::from([0, 1, 2].map(|k| 40.0 * hash_unit(i, k) - 20.0))
-    }
+    use crate::math::testing::place;
 
     #[test]
     fn without_randomness_points_are_lattice_points() {

@@ -10,6 +10,8 @@ pub mod noise;
 pub mod octahedral;
 pub mod sampler;
 pub mod shared_exponent;
+#[cfg(test)]
+mod testing;
 pub mod warp;
 
 pub use color::{LUMINANCE, luminance};

@@ -131,11 +131,7 @@ fn unit(a: u32, b: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::sampler::hash_unit;
-
-    fn place(i: u32) -> Vec3 {
-        Vec3::from([0, 1, 2].map(|k| 40.0 * hash_unit(i, k) - 20.0))
-    }
+    use crate::math::testing::place;
 
     #[test]
     fn noise_is_smooth_bounded_and_of_mean_zero() {

@@ -98,21 +98,11 @@ impl Table {
 
 /// How many textures and constants a texture looks up, itself included.
 fn lookups(texture: &Texture, all: &[Texture]) -> usize {
-    let of = match texture {
-        Texture::Multilinear(t) => t.of.as_slice(),
-        Texture::Table(t) => t.of.as_slice(),
-        Texture::Image(t) => t.at.as_slice(),
-        Texture::Length(of) => std::slice::from_ref(of),
-        Texture::Bricks(t) => t.place.value().map(std::slice::from_ref).unwrap_or_default(),
-        Texture::Cells(t) => t.place.value().map(std::slice::from_ref).unwrap_or_default(),
-        Texture::Noise(t) => t.place.value().map(std::slice::from_ref).unwrap_or_default(),
-        Texture::Constant(_) | Texture::Attribute { .. } => &[],
-    };
     let of_value = |v: &Value| match v {
         Value::Constant(_) => 1,
         Value::Texture { texture, .. } => lookups(&all[*texture as usize], all),
     };
-    1 + of.iter().map(of_value).sum::<usize>()
+    1 + texture.made_of().iter().map(of_value).sum::<usize>()
 }
 
 /// Checks what a texture is made of: all of that was there before it, so that none is made of itself.

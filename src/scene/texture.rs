@@ -68,6 +68,14 @@ pub enum Place {
 }
 
 impl Place {
+    /// The attribute, if it is one.
+    pub fn attribute(&self) -> Option<&str> {
+        match self {
+            Self::Attribute(name) => Some(name),
+            Self::Value(_) => None,
+        }
+    }
+
     /// The value, if it is one.
     pub fn value(&self) -> Option<&Value> {
         match self {
@@ -223,6 +231,41 @@ fn ones() -> [f32; 4] {
 }
 
 impl Texture {
+    /// Where it is looked up, if it is a pattern.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Noise(t) => Some(&t.place),
+            Self::Cells(t) => Some(&t.place),
+            Self::Bricks(t) => Some(&t.place),
+            Self::Constant(_)
+            | Self::Image(_)
+            | Self::Length(_)
+            | Self::Attribute { .. }
+            | Self::Multilinear(_)
+            | Self::Table(_) => None,
+        }
+    }
+
+    /// The attribute of the mesh that it reads, by name: a UV set or a colour.
+    pub fn attribute(&self) -> Option<&str> {
+        match self {
+            Self::Image(t) => Some(&t.uv),
+            Self::Attribute { name, .. } => Some(name),
+            _ => self.place().and_then(Place::attribute),
+        }
+    }
+
+    /// The values that it is made of.
+    pub fn made_of(&self) -> &[Value] {
+        match self {
+            Self::Multilinear(t) => &t.of,
+            Self::Table(t) => &t.of,
+            Self::Image(t) => t.at.as_slice(),
+            Self::Length(of) => std::slice::from_ref(of),
+            _ => self.place().and_then(Place::value).map(std::slice::from_ref).unwrap_or_default(),
+        }
+    }
+
     /// A texture from its JSON description (`docs/abi.md`), and from the images and other textures that are there.
     pub fn from_json(
         name: &str,

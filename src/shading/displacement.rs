@@ -56,7 +56,9 @@ pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene
 /// The mesh of a group as its materials displace it, and how many vertices have no finite place.
 fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, to_world: Mat3) -> (Mesh, u64) {
     let mesh = &scene.meshes[group.mesh as usize];
-    let normals = vertex_normals(mesh);
+    let given: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| corner_normals(mesh, t)).collect();
+    let normals = vertex_normals(mesh, &given);
+    let (of_normals, from_world) = (normal_matrix(to_world), to_world.inverse());
     let displacement = |triangle: usize| {
         let slot = mesh.slots.as_ref().map_or(0, |s| s[triangle] as usize);
         scene.materials[group.material(slot) as usize].displacement.as_ref()
@@ -76,9 +78,7 @@ fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, to_worl
             let normal = normals[v as usize];
             let moved = match space {
                 BumpSpace::Object => normal * height,
-                BumpSpace::World => {
-                    to_world.inverse() * (normalize_any(normal_matrix(to_world) * normal) * height)
-                }
+                BumpSpace::World => from_world * (normalize_any(of_normals * normal) * height),
             };
             let position = &mut result.positions[v as usize];
             if (*position + moved).is_finite() {
@@ -89,7 +89,7 @@ fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, to_worl
         }
     }
     let keeps = |triangle: usize| displacement(triangle).is_some_and(|d| d.keeps_normals);
-    result.normals = new_normals(mesh, &result.positions, keeps);
+    result.normals = new_normals(mesh, &given, &result.positions, keeps);
     (result, bad)
 }
 
@@ -110,26 +110,31 @@ fn corner_normals(mesh: &Mesh, triangle: usize) -> [Vec3; 3] {
     )
 }
 
-/// The directions in which vertices move.
-fn vertex_normals(mesh: &Mesh) -> Vec<Vec3> {
+/// The directions in which vertices move, of the normals at the corners of triangles.
+fn vertex_normals(mesh: &Mesh, given: &[[Vec3; 3]]) -> Vec<Vec3> {
     let mut sums = vec![Vec3::ZERO; mesh.positions.len()];
-    for (t, vertices) in mesh.triangles.iter().enumerate() {
-        for (&v, n) in vertices.iter().zip(corner_normals(mesh, t)) {
-            sums[v as usize] += n;
+    for (vertices, normals) in mesh.triangles.iter().zip(given) {
+        for (&v, n) in vertices.iter().zip(normals) {
+            sums[v as usize] += *n;
         }
     }
     sums.into_iter().map(normalize_any).collect()
 }
 
 /// Shading normals of moved vertices: corners of a vertex that had one normal have one again, the mean of their triangles'. Some
-/// triangles keep theirs.
-fn new_normals(mesh: &Mesh, positions: &[Vec3], keeps: impl Fn(usize) -> bool) -> Option<Attribute<Vec3>> {
+/// triangles keep what they were given.
+fn new_normals(
+    mesh: &Mesh,
+    given: &[[Vec3; 3]],
+    positions: &[Vec3],
+    keeps: impl Fn(usize) -> bool,
+) -> Option<Attribute<Vec3>> {
     let is_smooth = matches!(mesh.normals, Some(Attribute::Vertex(_) | Attribute::Corner(_)));
     if !is_smooth && !(0..mesh.triangles.len()).any(&keeps) {
         return None;
     }
     let keys = |t: usize| {
-        let normals = corner_normals(mesh, t).map(|n| n.to_array().map(f32::to_bits));
+        let normals = given[t].map(|n| n.to_array().map(f32::to_bits));
         let vertices = mesh.triangles[t];
         [0, 1, 2].map(|k| (vertices[k], normals[k]))
     };
@@ -140,7 +145,7 @@ fn new_normals(mesh: &Mesh, positions: &[Vec3], keeps: impl Fn(usize) -> bool) -
     }
     let of_corners = |t: usize| {
         if keeps(t) {
-            corner_normals(mesh, t)
+            given[t]
         } else if is_smooth {
             keys(t).map(|key| normalize_any(sums[&key]))
         } else {

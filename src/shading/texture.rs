@@ -48,39 +48,13 @@ const FIRST: u32 = u32::MAX;
 impl TextureSet {
     /// Resolves the names of a scene's textures.
     pub fn new(scene: Arc<Scene>) -> Self {
-        let names: Vec<&str> = scene
-            .textures
-            .iter()
-            .filter_map(|t| match t {
-                Texture::Constant(_) | Texture::Length(_) | Texture::Multilinear(_) | Texture::Table(_) => {
-                    None
-                }
-                Texture::Image(t) => Some(t.uv.as_str()),
-                Texture::Noise(t) => attribute_of(&t.place),
-                Texture::Cells(t) => attribute_of(&t.place),
-                Texture::Bricks(t) => attribute_of(&t.place),
-                Texture::Attribute { name, .. } => Some(name.as_str()),
-            })
-            .collect();
+        let names: Vec<&str> = scene.textures.iter().filter_map(Texture::attribute).collect();
         let number = |name: &str| match name {
             "" => FIRST,
             // a name that no texture asks for gets a number past the end
             _ => names.iter().position(|n| *n == name).unwrap_or(names.len()) as u32,
         };
-        let texture_names = scene
-            .textures
-            .iter()
-            .map(|t| match t {
-                Texture::Constant(_) | Texture::Length(_) | Texture::Multilinear(_) | Texture::Table(_) => {
-                    FIRST
-                }
-                Texture::Image(t) => number(&t.uv),
-                Texture::Noise(t) => attribute_of(&t.place).map_or(FIRST, number),
-                Texture::Cells(t) => attribute_of(&t.place).map_or(FIRST, number),
-                Texture::Bricks(t) => attribute_of(&t.place).map_or(FIRST, number),
-                Texture::Attribute { name, .. } => number(name),
-            })
-            .collect();
+        let texture_names = scene.textures.iter().map(|t| t.attribute().map_or(FIRST, number)).collect();
         let uv_names = scene.meshes.iter().map(|m| m.uvs.iter().map(|(n, _)| number(n)).collect()).collect();
         let color_names =
             scene.meshes.iter().map(|m| m.colors.iter().map(|(n, _)| number(n)).collect()).collect();
@@ -279,14 +253,6 @@ fn bricks(t: &BrickTexture, place: Vec3) -> Vec4 {
 /// What powers and products make of extreme values is 0 where it is not finite.
 pub(super) fn finite(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
-}
-
-/// The attribute by which a place is told.
-fn attribute_of(place: &Place) -> Option<&str> {
-    match place {
-        Place::Attribute(name) => Some(name),
-        Place::Value(_) => None,
-    }
 }
 
 fn part(channel: Channel, v: Vec4) -> Vec3 {
