@@ -15,6 +15,7 @@ use segue::transport::cluster::{Clusters, Numbered};
 use segue::transport::grid::Grid;
 use segue::transport::kernel::Kernel;
 use segue::transport::light::LightSampler;
+use segue::transport::sparse::Bits;
 use segue::transport::store::{Arrivals, CameraStore, LightStore};
 use segue::transport::{Cut, Estimator};
 use std::fs;
@@ -124,7 +125,7 @@ fn cluster_maps() {
         assert!(clusters.group(
             &world,
             &grid,
-            Numbered { camera: &store.arrivals, light: &Arrivals::default() },
+            Numbered { camera: &store.arrivals, light: &Arrivals::default(), ends: &Bits::default() },
             &cut
         ));
         let color = |p: &Primary| match p.arrival {

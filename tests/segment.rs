@@ -3,6 +3,7 @@
 mod common;
 
 use common::{PATH, POINT, RECT, Stage, WALL, corner_with_ball};
+use glam::DVec3;
 use segue::film::{Hints, Pass};
 
 /// The mean of a pass and its standard error, from 4 seeds.
@@ -193,6 +194,30 @@ fn passes_split_the_light_as_path_tracing_does() {
 
 /// What each path finds by itself is right on average, so beside it a large kernel is seen to blur and a small one is
 /// not: whatever were wrong with the unfiltered estimate would be told as a systematic error.
+/// A crack with a lamp on its ground, of which the camera sees the rim alone: what a kernel of four pixels has of its walls
+/// is brighter than that the farther down it is.
+#[test]
+fn a_kernel_does_not_reach_into_a_crack_beyond_what_is_seen() {
+    let mut s = Stage::default();
+    let wall = s.material(r#"{"surface":{"type":"diffuse","color":[0.5,0.5,0.5]}}"#);
+    let (far, gap, deep) = (1.0, 0.02, -0.5);
+    s.quad([[-far, -far, 0.], [0., -far, 0.], [0., far, 0.], [-far, far, 0.]], wall);
+    s.quad([[gap, -far, 0.], [far, -far, 0.], [far, far, 0.], [gap, far, 0.]], wall);
+    s.quad([[0., -far, deep], [0., far, deep], [0., far, 0.], [0., -far, 0.]], wall);
+    s.quad([[gap, far, deep], [gap, -far, deep], [gap, -far, 0.], [gap, far, 0.]], wall);
+    s.light(&format!(
+        r#"{{"type":"rect","width":{gap},"height":{},"radiance":[5,5,5],
+        "transform":[-1,0,0,{},0,1,0,0,0,0,-1,{deep},0,0,0,1]}}"#,
+        2.0 * far,
+        0.5 * gap
+    ));
+    s.camera(DVec3::new(-2.0, 0.0, 2.0), DVec3::ZERO, 0.2, "");
+    let reference = estimate(&s, 32, 512, Pass::Combined, PATH);
+    let set =
+        r#","integrator":"segment","next_event":false,"light_paths":24,"kernel":"fixed","kernel_size":4"#;
+    assert_agree("crack", estimate(&s, 32, 96, Pass::Combined, set), reference, 0.05);
+}
+
 #[test]
 fn the_systematic_error_of_large_kernels_is_told() {
     let frosted = r#"{"surface":{"type":"glass","ior":1.4,"roughness":0.5}}"#;

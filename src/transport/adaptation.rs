@@ -40,8 +40,6 @@ const VOXEL: u64 = !0 << 32;
 const LEAST_BLUR: f64 = 0.25;
 /// Share of a block's pixels that have to tell something.
 const LEAST_SHARE: f64 = 0.1;
-/// Cosine between normals of neighbouring pixels above which the surface goes on.
-const SMOOTH: f32 = 0.8;
 
 /// For every candidate.
 type PerSize = [f64; CANDIDATES.len()];
@@ -115,6 +113,8 @@ pub struct Look<'a> {
     pub sensor: &'a Sensor,
     /// What its pixels saw, row by row.
     pub primaries: &'a [Primary],
+    /// Those around which the surface goes on, see [`super::outline`].
+    pub is_clear: &'a [bool],
     /// Arrivals of the camera's paths.
     pub arrivals: &'a Arrivals,
     /// Seed of the grids.
@@ -188,7 +188,7 @@ impl Adaptation {
         let counts = [completed.div_ceil(2), completed / 2].map(|n| n as f32);
         let shown = &self.shown[first..][..band.area()];
         let means: Vec<[f32; 2]> = shown.iter().map(|s| [s[0] / counts[0], s[1] / counts[1]]).collect();
-        let clear = clear_pixels(look);
+        let clear = telling_pixels(look);
         let all = clear.iter().map(|&(pixel, _)| f64::from(middle(means[pixel as usize]))).sum::<f64>();
         let floor = DARK * (all / clear.len().max(1) as f64) as f32;
         let mut scales = vec![0.0f32; means.len()];
@@ -273,32 +273,14 @@ fn middle(halves: [f32; 2]) -> f32 {
     0.5 * (halves[0] + halves[1])
 }
 
-/// Pixels around which the surface goes on, so that what they show is that of one place, with their arrivals.
-fn clear_pixels(look: &Look) -> Vec<(u32, u32)> {
-    let (width, height) = (look.band.width, look.band.height);
-    let seen = |pixel: u32| {
-        let p = &look.primaries[pixel as usize];
-        p.arrival.filter(|_| p.albedo > 0.0).map(|a| (a, p.passages))
+/// Pixels around which the surface goes on and that reflect something, with their arrivals.
+fn telling_pixels(look: &Look) -> Vec<(u32, u32)> {
+    let pixels = look.primaries.iter().zip(look.is_clear).enumerate();
+    let seen = |(pixel, (p, is_clear)): (usize, (&Primary, &bool))| {
+        let arrival = p.arrival.filter(|_| *is_clear && p.albedo > 0.0)?;
+        Some((pixel as u32, arrival))
     };
-    let clear = |pixel: u32| {
-        let (number, passages) = seen(pixel)?;
-        let a = look.arrivals.get(number as usize);
-        let reach = look.sensor.pixel_footprint(a.position);
-        let goes_on = |neighbour: u32| {
-            seen(neighbour).is_some_and(|(n, p)| {
-                let b = look.arrivals.get(n as usize);
-                let rise = (b.position - a.position).dot(a.normal).abs();
-                p == passages && a.class == b.class && a.normal.dot(b.normal) > SMOOTH && rise < reach
-            })
-        };
-        let (x, y) = (pixel % width, pixel / width);
-        let all_around = (x == 0 || goes_on(pixel - 1))
-            && (x + 1 == width || goes_on(pixel + 1))
-            && (y == 0 || goes_on(pixel - width))
-            && (y + 1 == height || goes_on(pixel + width));
-        all_around.then_some((pixel, number))
-    };
-    (0..width * height).into_par_iter().filter_map(clear).collect()
+    pixels.filter_map(seen).collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! How a voxel is divided where something stands between its points, so that light does not pass through thin walls.
+//! How a voxel is divided where something stands between its points, so that light does not pass through thin walls, and
+//! where the camera sees only a part of it.
 //!
 //! The first arrival is a *hub*: what it sees is one part. What it does not see has a hub of its own, and so on: one
 //! hub would not do, since it may lie in a crevice that nothing else is seen from, or the two sides of a wall may both be
@@ -14,6 +15,9 @@ pub const MOST_PARTS: usize = 4;
 /// By how much points are lifted off their surface before it is asked whether something stands between
 /// them, in edges of the voxel.
 const LIFT: f32 = 0.05;
+
+/// The same before it is asked whether the camera sees them.
+const SIGHT_LIFT: f32 = 1e-3;
 
 /// A point from which it is asked what it sees.
 struct Hub {
@@ -32,6 +36,18 @@ impl Hub {
     fn sees(&self, world: &World, (p, normal): (Vec3, Vec3)) -> bool {
         world.is_clear(p + normal * self.lift, self.point)
     }
+}
+
+/// Whether the camera sees a point of a surface on the side of this normal.
+///
+/// A kernel over what it sees and what it does not would blur light into the picture from where no pixel looks: out of a
+/// gap of which the camera sees the rim alone, from behind whatever stands before a surface.
+pub fn is_in_sight(world: &World, grid: &Grid, (p, normal): (Vec3, Vec3)) -> bool {
+    let Some(eye) = grid.seen_from(p) else { return false };
+    let (_, edge) = grid.place(&grid.voxel(p));
+    // hardly aside: what is seen into a narrow gap must not depend on it
+    let start = p + (normal + (eye - p).normalize_or_zero()) * (SIGHT_LIFT * edge);
+    world.is_clear(start, eye)
 }
 
 /// The part of each of these points of a voxel, positions with normals, is written to `parts`. Returns how many
@@ -56,20 +72,31 @@ pub fn divide(world: &World, grid: &Grid, points: &[(Vec3, Vec3)], parts: &mut V
 /// The parts of a voxel, by their hubs.
 pub struct Division<'a> {
     world: &'a World,
+    grid: &'a Grid<'a>,
     hubs: Vec<Hub>,
+    in_sight: Option<bool>,
 }
 
 impl<'a> Division<'a> {
-    /// By the first point of each part, position with normal.
-    pub fn new(world: &'a World, grid: &Grid, firsts: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
+    /// By the first point of each part, position with normal. `in_sight`: whether they are of what the camera sees or of
+    /// what it does not see, if that is apart.
+    pub fn new(
+        world: &'a World,
+        grid: &'a Grid,
+        firsts: impl Iterator<Item = (Vec3, Vec3)>,
+        in_sight: Option<bool>,
+    ) -> Self {
         let hubs = firsts.take(MOST_PARTS - 1).map(|first| Hub::new(grid, first)).collect();
-        Self { world, hubs }
+        Self { world, grid, hubs, in_sight }
     }
 
-    /// The part to which a point belongs: the first whose hub sees it, or one that comes after those of the hubs.
-    pub fn part(&self, point: Vec3, normal: Vec3) -> usize {
-        let seen = self.hubs.iter().position(|hub| hub.sees(self.world, (point, normal)));
-        seen.unwrap_or(self.hubs.len())
+    /// The part to which a point belongs: the first whose hub sees it, or one that comes after those of the hubs; `None` on
+    /// the other side of sight.
+    pub fn part(&self, point: Vec3, normal: Vec3) -> Option<usize> {
+        let place = (point, normal);
+        let is_here = self.in_sight.is_none_or(|s| is_in_sight(self.world, self.grid, place) == s);
+        let seen = || self.hubs.iter().position(|hub| hub.sees(self.world, place));
+        is_here.then(|| seen().unwrap_or(self.hubs.len()))
     }
 }
 
@@ -103,9 +130,9 @@ mod tests {
         let mut parts = Vec::new();
         let count = divide(&world, &grid, &places, &mut parts, &ON);
         let firsts = (0..count).map(|part| parts.iter().position(|&p| usize::from(p) == part).unwrap());
-        let division = Division::new(&world, &grid, firsts.map(|k| places[k]));
+        let division = Division::new(&world, &grid, firsts.map(|k| places[k]), None);
         for (&(p, n), &part) in places.iter().zip(&parts) {
-            assert_eq!(division.part(p, n), usize::from(part));
+            assert_eq!(division.part(p, n), Some(part.into()));
         }
         (parts, count)
     }
@@ -118,6 +145,20 @@ mod tests {
         assert_eq!(parts_of(&[wall], &points), (vec![0, 0, 1, 1, 0], 2));
         assert_eq!(parts_of(&[wall, lid(points[0])], &points), (vec![0, 1, 2, 2, 1], 3));
         assert_eq!(parts_of(&[], &points), (vec![0; 5], 1));
+    }
+
+    #[test]
+    fn points_are_in_sight_on_the_camera_s_side_of_what_stands_before_it() {
+        let wall = [Vec3::new(-1.0, -0.5, -1.05), Vec3::new(1.0, 0.5, -0.95)];
+        let (world, sensor) = (on_floor(&[wall]), sensor());
+        let grid = Grid::new(&sensor, 4.0, 3);
+        let seen = |x: f32, z: f32| is_in_sight(&world, &grid, (Vec3::new(x, -0.5, z), Vec3::Y));
+        assert_eq!(
+            [seen(0.0, -0.9), seen(0.3, -0.5), seen(0.0, -1.1), seen(0.3, -1.9)],
+            [true, true, false, false]
+        );
+        // nor is what lies behind the camera, nor what is nowhere
+        assert!(!seen(0.0, 0.5) && !seen(f32::NAN, -0.9));
     }
 
     #[test]

@@ -101,6 +101,11 @@ impl<'a> Grid<'a> {
         q.x as u32 + q.y as u32 * NORMAL_BINS as u32
     }
 
+    /// Where the sight of a point from the middle of the lens ends; `None` beyond the clipping planes.
+    pub fn seen_from(&self, p: Vec3) -> Option<Vec3> {
+        self.sensor.view(p, Vec2::splat(0.5)).map(|view| view.end)
+    }
+
     /// The key of an arrival: equal for those that share a cluster.
     pub fn key(&self, a: &Arrival) -> u64 {
         key(&self.voxel(a.position), self.bin(a.normal), a.class)

@@ -35,6 +35,20 @@ impl Bits {
         self.len += 1;
     }
 
+    /// Adds places up to this one, which is the only yes among them.
+    pub fn mark(&mut self, place: usize) {
+        while self.len < place {
+            self.push(false);
+        }
+        self.push(true);
+    }
+
+    /// Whether the answer at a place is yes; beyond the last one it is not.
+    #[inline]
+    pub fn has(&self, i: usize) -> bool {
+        i < self.len && self.get(i)
+    }
+
     /// The answer at a place.
     #[inline]
     pub fn get(&self, i: usize) -> bool {

@@ -4,6 +4,7 @@ use super::camera::CameraSampler;
 use super::cluster::{Areas, Clusters, Numbered};
 use super::grid::Grid;
 use super::light::LightSampler;
+use super::sparse::Bits;
 use super::store::{CameraStore, LightStore};
 use super::{Cut, Estimator};
 use crate::math::{Sampler, warp};
@@ -99,7 +100,7 @@ pub fn sampled(world: &World, seed: u32, camera_paths: u32, light_paths: u32) ->
 pub fn clustered(world: &World, camera: &CameraStore, light: &LightStore, areas: Areas) -> Clusters {
     let sensor = sensor();
     let grid = Grid::new(&sensor, 4.0, 3);
-    let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
+    let all = Numbered { camera: &camera.arrivals, light: &light.arrivals, ends: &Bits::default() };
     let mut clusters = Clusters::default();
     assert!(clusters.group(world, &grid, all, &ON) && clusters.measure(world, &grid, all, areas, &ON));
     clusters

@@ -10,6 +10,7 @@ use segue::shading::World;
 use segue::transport::area::unit_plane_cut;
 use segue::transport::cluster::{Areas, Clusters, Numbered};
 use segue::transport::grid::Grid;
+use segue::transport::sparse::Bits;
 use segue::transport::store::{Arrival, Arrivals};
 use std::f64::consts::PI;
 
@@ -53,7 +54,7 @@ fn bias(world: &World, seeds: u32, photons: impl Fn(u32) -> Arrivals, truth: Tru
     for seed in 0..seeds {
         let photons = photons(seed);
         let grid = Grid::new(&sensor, 1.0, seed);
-        let all = Numbered { camera: &Arrivals::default(), light: &photons };
+        let all = Numbered { camera: &Arrivals::default(), light: &photons, ends: &Bits::default() };
         let areas = both_areas(world, &grid, all);
         for (i, exact) in truth(&grid, &photons).into_iter().enumerate() {
             let Some(exact) = exact else { continue };
@@ -178,7 +179,11 @@ fn a_tilted_plane_is_cut_exactly() {
             .count();
         let exact = inside as f32 * cell * cell / a.normal.z.abs();
         let mut clusters = Clusters::default();
-        let all = Numbered { camera: &Arrivals::default(), light: &[a, a].into_iter().collect() };
+        let all = Numbered {
+            camera: &Arrivals::default(),
+            light: &[a, a].into_iter().collect(),
+            ends: &Bits::default(),
+        };
         assert!(
             clusters.group(&world, &grid, all, &ON) && clusters.measure(&world, &grid, all, Areas::True, &ON)
         );
@@ -209,7 +214,7 @@ fn photons_on_spheres_are_as_dense_as_they_are() {
         let density = |seed: u32| {
             let (camera, light) = (uniform(2 * seed, queries), uniform(2 * seed + 1, photons));
             let grid = Grid::new(&sensor, 1.0, seed);
-            let all = Numbered { camera: &camera, light: &light };
+            let all = Numbered { camera: &camera, light: &light, ends: &Bits::default() };
             // every query finds the photons of its cluster, each over the cluster's area
             let areas = both_areas(&world, &grid, all);
             let mut clusters = Clusters::default();
@@ -235,4 +240,49 @@ fn photons_on_spheres_are_as_dense_as_they_are() {
         assert!((covered - 1.0).abs() < 0.01 + 3.0 * sigma, "{covered} +- {sigma}");
         assert!(sigma < 0.01, "too noisy: {sigma}");
     }
+}
+
+/// A floor, half of it hidden from the camera by a plate far above it, where photons are five times as dense: what it sees is
+/// as bright as it is, once clusters are told that something ends there.
+#[test]
+fn what_the_camera_does_not_see_is_apart() {
+    let mut s = Stage::default();
+    let grey = s.material(GREY);
+    s.quad([[-1., -1., -2.], [1., -1., -2.], [1., 1., -2.], [-1., 1., -2.]], grey);
+    s.quad([[0., -1., -1.], [1., -1., -1.], [1., 1., -1.], [0., 1., -1.]], grey);
+    let world = world(&mut s);
+    let sensor = sensor(EDGE);
+    let (sparse, dense) = (40.0f64, 200.0f64);
+    let half = 0.25f32;
+    let drop = |x: f32, y: f32| arrive(&world, Vec3::new(x, y, -1.5), Vec3::NEG_Z);
+    // over a strip of a quarter to either side of the edge, as long as twice that
+    let on = |side: f32, count: u32, seed: u32| {
+        let u = move |k| hash_unit(seed, k);
+        (0..count).filter_map(move |k| drop(side * half * u(2 * k), half * (2.0 * u(2 * k + 1) - 1.0)))
+    };
+    let area = f64::from(2.0 * half * half);
+    let density = |seed: u32, marks: bool| {
+        let [few, many] = [sparse, dense].map(|d| (d * 100.0 * area) as u32);
+        let light: Arrivals = on(-1.0, few, 4 * seed).chain(on(1.0, many, 4 * seed + 1)).collect();
+        // all within a voxel of the edge
+        let near = |a: &Arrival| a.position.x > -EDGE && a.position.y.abs() < half - 2.0 * EDGE;
+        let camera: Arrivals = on(-1.0, 4000, 4 * seed + 2).filter(near).collect();
+        let mut ends = Bits::default();
+        (0..camera.len()).filter(|_| marks).for_each(|i| ends.mark(i));
+        let grid = Grid::new(&sensor, 1.0, seed);
+        let all = Numbered { camera: &camera, light: &light, ends: &ends };
+        let mut clusters = Clusters::default();
+        assert!(clusters.group(&world, &grid, all, &ON));
+        assert!(clusters.measure(&world, &grid, all, Areas::OfPhotons, &ON));
+        let found = |i: usize| {
+            let c = &clusters.clusters[clusters.of(i)];
+            f64::from(c.lights) * f64::from(c.inverse_area)
+        };
+        (0..camera.len()).map(found).sum::<f64>() / camera.len() as f64 / (100.0 * sparse)
+    };
+    let found = |marks| mean_and_error(&(0..240).map(|seed| density(seed, marks)).collect::<Vec<_>>());
+    let ((apart, sigma), (joined, _)) = (found(true), found(false));
+    println!("seen alone {apart} +- {sigma}, joined {joined}");
+    assert!((apart - 1.0).abs() < 0.01 + 4.0 * sigma && sigma < 0.02, "{apart} +- {sigma}");
+    assert!(joined > 1.3, "{joined}");
 }

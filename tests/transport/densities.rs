@@ -10,6 +10,7 @@ use segue::transport::Estimator;
 use segue::transport::arrival::arrival;
 use segue::transport::cluster::{Areas, Clusters, Numbered};
 use segue::transport::grid::Grid;
+use segue::transport::sparse::Bits;
 use segue::transport::store::{Arrival, CameraStore, LightStore, NextEvent, Outgoing, Photon, Rivals};
 use segue::transport::walk::End;
 use segue::transport::weigh::{Sampled, Weights};
@@ -104,7 +105,7 @@ fn measured_etendue(world: &World, seed: u32, paths: u32, footprint: f32) -> f64
     light.carries.resize(light.photons.len(), Vec3::ONE);
     let sensor = sensor(footprint);
     let grid = Grid::new(&sensor, 1.0, seed);
-    let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
+    let all = Numbered { camera: &camera.arrivals, light: &light.arrivals, ends: &Bits::default() };
     let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
     assert!(clusters.group(world, &grid, all, &ON) && clusters.measure(world, &grid, all, Areas::True, &ON));
     let s = Sampled { world, camera: &camera, light: &light, clusters: &clusters, bridges: None };
@@ -178,7 +179,7 @@ fn densities_integrate_to_the_number_of_paths_that_go_on() {
             }
             let sensor = sensor(0.15);
             let grid = Grid::new(&sensor, 1.0, seed);
-            let all = Numbered { camera: &camera.arrivals, light: &light.arrivals };
+            let all = Numbered { camera: &camera.arrivals, light: &light.arrivals, ends: &Bits::default() };
             let (mut clusters, mut weights) = (Clusters::default(), Weights::default());
             assert!(clusters.group(&world, &grid, all, &ON));
             assert!(clusters.measure(&world, &grid, all, Areas::True, &ON));

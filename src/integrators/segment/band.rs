@@ -12,6 +12,7 @@ use crate::transport::cluster::{Areas, Clusters, Numbered};
 use crate::transport::glances;
 use crate::transport::grid::Grid;
 use crate::transport::light::LightSampler;
+use crate::transport::outline::{clear_pixels, ends};
 use crate::transport::propagate::Reflected;
 use crate::transport::store::{CameraStore, LightStore};
 use crate::transport::weigh::{Sampled, Weights};
@@ -62,6 +63,8 @@ pub(super) struct Band {
     pub reflected: Reflected,
     /// What every pixel sees, row by row.
     pub primaries: Vec<Primary>,
+    /// For every pixel, whether the surface that it sees goes on around it.
+    pub is_clear: Vec<bool>,
     /// The first surface that every pixel sees, if a pass asks for it.
     first_hits: Vec<Option<FirstHit>>,
     /// For every pixel, the size of the voxel in which it is filtered, octaves over the kernel's.
@@ -110,7 +113,9 @@ impl Band {
         let edge = self.techniques.kernel.edge(context.completed);
         let grid = Grid::new(sensor, edge, hash(context.seed ^ GRID_STREAM, index))
             .with_sizes(learnt.adaptation.sizes());
-        let all = Numbered { camera: &self.camera.arrivals, light: &self.light.arrivals };
+        self.is_clear = clear_pixels(context.crop.width, sensor, &self.primaries, &self.camera.arrivals);
+        let ends = ends(&self.primaries, &self.is_clear);
+        let all = Numbered { camera: &self.camera.arrivals, light: &self.light.arrivals, ends: &ends };
         // bridges may begin at any light arrival; the other estimators follow light paths to their ends
         let needs_all = context.keep_all
             || self.techniques.estimator != Estimator::LeaveOneOut
@@ -356,6 +361,7 @@ impl Band {
             + self.reflected.bytes()
             + self.primaries.capacity() * size_of::<Primary>()
             + self.first_hits.capacity() * size_of::<Option<FirstHit>>()
+            + self.is_clear.capacity() * size_of::<bool>()
             + (self.starts.capacity() + self.octaves.capacity()) * size_of::<f32>()
     }
 

@@ -113,6 +113,7 @@ impl Learnt {
                 band: context.crop,
                 sensor: context.sensor,
                 primaries: &band.primaries,
+                is_clear: &band.is_clear,
                 arrivals: &sampled.camera.arrivals,
                 seed: hash(context.seed ^ ADAPTATION_STREAM, context.completed),
                 completed: context.completed + 1,

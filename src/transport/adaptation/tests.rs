@@ -2,6 +2,7 @@ use super::*;
 use crate::math::sampler::hash_unit;
 use crate::scene::Camera;
 use crate::shading::{Address, SurfaceClass};
+use crate::transport::outline::clear_pixels;
 use crate::transport::store::Arrival;
 use crate::transport::testing::ON;
 use glam::{Vec2, Vec3};
@@ -51,6 +52,7 @@ fn adapted(light: impl Fn(u32, u32) -> f32, noise: f32, depth: impl Fn(u32, u32)
             band: PICTURE,
             sensor: &sensor,
             primaries: &primaries,
+            is_clear: &clear_pixels(SIDE, &sensor, &primaries, &arrivals),
             arrivals: &arrivals,
             seed: completed,
             completed,

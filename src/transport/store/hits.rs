@@ -49,11 +49,8 @@ impl Hits {
     /// Adds one, of the same arrival as the last or a later one.
     pub fn push(&mut self, h: EmissionHit) {
         let arrival = h.arrival as usize;
-        while self.places.len() < arrival {
-            self.places.push(false);
-        }
-        if self.places.len() == arrival {
-            self.places.push(true);
+        if self.places.len() <= arrival {
+            self.places.mark(arrival);
         }
         self.hits.push(Packed {
             arrival: h.arrival,
@@ -68,7 +65,7 @@ impl Hits {
     /// Whether the segment that left arrival `i` met some.
     #[inline]
     pub fn has(&self, i: usize) -> bool {
-        i < self.places.len() && self.places.get(i)
+        self.places.has(i)
     }
 
     /// Those of the segment that left arrival `i`.
