@@ -8,6 +8,8 @@ RENDER_ARGS ?= --time 30
 
 LIBRARY := build/libsegue.so
 VENV := .venv
+# As many at a time as there are cores: most tests use one.
+PYTEST := $(VENV)/bin/pytest -q -n auto --dist worksteal
 PIP_FLAGS := --quiet --disable-pip-version-check
 
 .PHONY: all library render test lint test-rust test-c test-python test-blender-current test-blender stress \
@@ -55,8 +57,8 @@ test-c: library
 	build/outsider
 
 test-python: all
-	$(VENV)/bin/pytest -q tests/python
-	$(VENV)/bin/pytest -q tests/stability
+	$(PYTEST) tests/python
+	$(PYTEST) tests/stability
 
 # The stability suite in full, and its report docs/stability.md.
 stress: all

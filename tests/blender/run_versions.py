@@ -52,6 +52,7 @@ def main(versions: list[str]) -> int:
             print(f"skipped: {VERSIONS[version][1]} is not installed")
             continue
         command = ["env", f"SEGUE_BPY_PYTHON={python}", sys.executable, "-m", "pytest", "-q", HERE]
+        command += ["-n", "auto", "--dist", "worksteal"]
         if subprocess.run(command, cwd=REPOSITORY, check=False).returncode:
             failed.append(version)
     if failed:
