@@ -8,8 +8,9 @@ RENDER_ARGS ?= --time 30
 
 LIBRARY := build/libsegue.so
 VENV := .venv
-# As many at a time as there are cores: most tests use one.
+# As many tests at a time as there are cores; those that look at the clock have the machine for themselves.
 PYTEST := $(VENV)/bin/pytest -q -n auto --dist worksteal
+TIMED := tests/python/test_cli.py tests/python/test_converge.py
 PIP_FLAGS := --quiet --disable-pip-version-check
 
 .PHONY: all library render test lint test-rust test-c test-python test-blender-current test-blender stress \
@@ -57,7 +58,8 @@ test-c: library
 	build/outsider
 
 test-python: all
-	$(PYTEST) tests/python
+	$(PYTEST) tests/python $(addprefix --ignore=,$(TIMED))
+	$(VENV)/bin/pytest -q $(TIMED)
 	$(PYTEST) tests/stability
 
 # The stability suite in full, and its report docs/stability.md.

@@ -15,7 +15,7 @@ use segue::transport::cluster::{Clusters, Numbered};
 use segue::transport::grid::Grid;
 use segue::transport::kernel::Kernel;
 use segue::transport::light::LightSampler;
-use segue::transport::sparse::Bits;
+use segue::transport::outline::{clear_pixels, ends};
 use segue::transport::store::{Arrivals, CameraStore, LightStore};
 use segue::transport::{Cut, Estimator};
 use std::fs;
@@ -116,6 +116,7 @@ fn cluster_maps() {
     let world = World::new(Arc::new(s.0.build().unwrap()), false).unwrap();
     let sensor = Sensor::new(&world.scene().camera, SIDE, SIDE);
     let (store, primaries) = seen(&world, &sensor);
+    let ends = ends(&primaries, &clear_pixels(SIDE, &sensor, &primaries, &store.arrivals));
     let cut = Cut(&|| false);
     for iteration in [0, 100] {
         // as a picture of a third of the size has them, for the eye
@@ -125,7 +126,7 @@ fn cluster_maps() {
         assert!(clusters.group(
             &world,
             &grid,
-            Numbered { camera: &store.arrivals, light: &Arrivals::default(), ends: &Bits::default() },
+            Numbered { camera: &store.arrivals, light: &Arrivals::default(), ends: &ends },
             &cut
         ));
         let color = |p: &Primary| match p.arrival {

@@ -192,8 +192,6 @@ fn passes_split_the_light_as_path_tracing_does() {
     }
 }
 
-/// What each path finds by itself is right on average, so beside it a large kernel is seen to blur and a small one is
-/// not: whatever were wrong with the unfiltered estimate would be told as a systematic error.
 /// A crack with a lamp on its ground, of which the camera sees the rim alone: what a kernel of four pixels has of its walls
 /// is brighter than that the farther down it is.
 #[test]
@@ -218,6 +216,8 @@ fn a_kernel_does_not_reach_into_a_crack_beyond_what_is_seen() {
     assert_agree("crack", estimate(&s, 32, 96, Pass::Combined, set), reference, 0.05);
 }
 
+/// What each path finds by itself is right on average, so beside it a large kernel is seen to blur and a small one is
+/// not: whatever were wrong with the unfiltered estimate would be told as a systematic error.
 #[test]
 fn the_systematic_error_of_large_kernels_is_told() {
     let frosted = r#"{"surface":{"type":"glass","ior":1.4,"roughness":0.5}}"#;

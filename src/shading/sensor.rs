@@ -95,6 +95,18 @@ impl Sensor {
     /// the clipping planes. The position on the film may lie outside the picture.
     pub fn view(&self, p: Vec3, lens: Vec2) -> Option<SensorView> {
         let c = &self.camera;
+        let lens = if c.aperture_radius > 0.0 { self.aperture(lens) * c.aperture_radius } else { Vec2::ZERO };
+        self.view_through(p, lens)
+    }
+
+    /// The same through the middle of the lens.
+    pub fn view_through_middle(&self, p: Vec3) -> Option<SensorView> {
+        self.view_through(p, Vec2::ZERO)
+    }
+
+    /// The same through a point of the lens in the camera's own space.
+    fn view_through(&self, p: Vec3, lens: Vec2) -> Option<SensorView> {
+        let c = &self.camera;
         let at = self.rotation.transpose() * p;
         let depth = -at.z;
         let [near, far] = c.clipping;
@@ -102,7 +114,6 @@ impl Sensor {
         if !(in_front && depth >= near && depth <= far) {
             return None;
         }
-        let lens = if c.aperture_radius > 0.0 { self.aperture(lens) * c.aperture_radius } else { Vec2::ZERO };
         // the ray through the lens point and `p`: its xy at a depth, and where it meets the window
         let (slope, origin, window) = match c.projection {
             Projection::Perspective => {

@@ -30,6 +30,19 @@ impl World {
         self.comes_through(from, None, hides, rays, |p| p.segment_to_point(end))
     }
 
+    /// Whether the camera, whose sight begins at `eye`, sees a point in space: nothing that it sees lies in between, but for
+    /// what may let light through as it is.
+    pub fn is_in_sight(&self, point: Vec3, eye: Vec3) -> bool {
+        let ray = Ray { t_max: 1.0, ..Ray::new(point, eye - point) };
+        if !self.needs().transparency && !self.needs().camera_visibility {
+            return !self.accel.occluded(&ray);
+        }
+        !self.accel.occluded_where(&ray, &|h| {
+            let material = self.scene.material_index(h.instance, h.triangle);
+            self.scene.group(h.instance).camera_visible && !self.materials.may_be_transparent(material)
+        })
+    }
+
     /// `to`: the surface at its end, unless that is a light or the camera. `for_camera`: past what the camera does not
     /// see. `ray_from`: the ray that is left from a point on it.
     fn comes_through(

@@ -38,6 +38,8 @@ pub struct Cell<'a> {
     pub representative: &'a Arrival,
     /// Whether something divides the voxel, and the cluster has but a part of it.
     pub is_divided: bool,
+    /// Whether it has what the camera sees of the voxel, or what it does not see: a sliver, perhaps.
+    pub is_cut: bool,
 }
 
 impl Cell<'_> {
@@ -60,7 +62,7 @@ impl Cell<'_> {
         mut triangles: impl Iterator<Item = (u32, u32)>,
     ) -> Option<f32> {
         let r = self.representative;
-        if self.is_divided || !triangles.all(|t| t == (r.at.instance, r.at.triangle)) {
+        if self.is_divided || self.is_cut || !triangles.all(|t| t == (r.at.instance, r.at.triangle)) {
             return None;
         }
         let (low, edge) = self.grid.place(&self.voxel);
@@ -84,12 +86,13 @@ impl Cell<'_> {
     /// 1945). Where that takes too many, the next one is taken to be on it: of `M` hits in `N` tries, the `k`-th is
     /// number `k (N + 1) / (M + 1)` in the mean, so the reciprocal's mean stays as it would have been.
     /// Estimates of different `wanted` are independent. `belongs`: whether a point with its normal is
-    /// in the cluster's part of the voxel. Adds the points that were tried to `probes`.
+    /// in the cluster's part of the voxel; `is_shown`: whether it is on the cluster's side of sight. Adds the points that were tried to `probes`.
     pub fn coverage(
         &self,
         world: &World,
         wanted: u32,
         belongs: &impl Fn(Vec3, Vec3) -> bool,
+        is_shown: &impl Fn(Vec3, Vec3) -> bool,
         probes: &mut u64,
     ) -> f32 {
         let (low, edge) = self.grid.place(&self.voxel);
@@ -105,7 +108,13 @@ impl Cell<'_> {
         let seed = hash(wanted, hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits())));
         let (mut sum, mut squares, mut tries, mut found) = (0.0, 0.0, 0, 0);
         let mut goal = wanted;
-        let mut most = if wanted == FEW_POINTS { FEW_TRIES } else { TRIES[0] };
+        let is_rough = wanted == FEW_POINTS;
+        let mut most = match (is_rough, self.is_cut) {
+            (true, false) => FEW_TRIES,
+            // a photon in a sliver that were taken to be large would keep its weight over a tiny area
+            (true, true) => TRIES[1],
+            (false, _) => TRIES[0],
+        };
         while found < goal && tries < most {
             let [u, v, choice] = std::array::from_fn(|k| hash_unit(seed, 3 * tries + k as u32));
             tries += 1;
@@ -138,7 +147,7 @@ impl Cell<'_> {
                     && (!is_doubtful || belongs(p.position, side));
                 let is_lower = upper.is_some_and(|(d, f)| f != faces && p.depth - d < NEAR_PLANE);
                 upper = (there && !is_lower).then_some((p.depth, faces));
-                if there && !is_lower {
+                if there && !is_lower && is_shown(p.position, side) {
                     is_there = true;
                     // a surface seen edge-on would count without bound
                     let slope = 1.0 / p.normal.abs().dot(shares).max(0.05);
@@ -147,7 +156,7 @@ impl Cell<'_> {
                 }
             });
             found += u32::from(is_there);
-            if tries == TRIES[0] && found < ENOUGH {
+            if !is_rough && tries == TRIES[0] && found < ENOUGH {
                 (goal, most) = (ENOUGH, TRIES[1]);
             }
         }

@@ -2,7 +2,7 @@
 
 use super::Cut;
 use super::area::{Cell, FEW_POINTS, MOST_POINTS, POINTS_OF_PHOTONS};
-use super::division::Division;
+use super::division::{Division, is_in_sight};
 use super::grid::Grid;
 use super::layout::{Layout, Piece};
 use super::unseen::{self, UNSEEN};
@@ -183,13 +183,15 @@ fn measure(
     if areas == Areas::None {
         return 0;
     }
-    let cell = Cell { grid, voxel, representative: &representative, is_divided: piece.is_divided() };
-    let division = Division::new(world, grid, piece.firsts().map(|i| all.place(i)), piece.in_sight);
+    let (is_divided, is_cut) = (piece.is_divided(), piece.in_sight.is_some());
+    let cell = Cell { grid, voxel, representative: &representative, is_divided, is_cut };
+    let division = Division::new(world, grid, piece.firsts().map(|i| all.place(i)));
     let exact = cell.on_one_triangle(world, members.iter().map(|&i| all.triangle(i)));
     let mut probes = 0;
     let mut estimate = |points: u32| {
-        let belongs = |p, n| division.part(p, n) == Some(piece.part.into());
-        exact.unwrap_or_else(|| cell.coverage(world, points, &belongs, &mut probes)) / sharing
+        let belongs = |p, n| division.part(p, n) == usize::from(piece.part);
+        let is_shown = |p, n| piece.in_sight.is_none_or(|s| is_in_sight(world, grid, (p, n)) == s);
+        exact.unwrap_or_else(|| cell.coverage(world, points, &belongs, &is_shown, &mut probes)) / sharing
     };
     let is_true = areas == Areas::True;
     c.area = estimate(if is_true { MOST_POINTS } else { FEW_POINTS });

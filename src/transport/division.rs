@@ -7,6 +7,7 @@
 
 use super::Cut;
 use super::grid::Grid;
+use crate::math::sampler::{hash, hash_unit};
 use crate::shading::World;
 use glam::Vec3;
 
@@ -16,8 +17,12 @@ pub const MOST_PARTS: usize = 4;
 /// them, in edges of the voxel.
 const LIFT: f32 = 0.05;
 
-/// The same before it is asked whether the camera sees them.
+/// The same before it is asked whether the camera sees them, and the least, over their largest coordinate: well above
+/// rounding.
 const SIGHT_LIFT: f32 = 1e-3;
+const LEAST_SIGHT_LIFT: f32 = 32.0 * f32::EPSILON;
+/// Points by which it is told how much of a voxel the camera sees.
+const SIGHT_POINTS: u32 = 16;
 
 /// A point from which it is asked what it sees.
 struct Hub {
@@ -38,7 +43,7 @@ impl Hub {
     }
 }
 
-/// Whether the camera sees a point of a surface on the side of this normal.
+/// Whether the camera, through the middle of its lens, sees a point of a surface with this normal.
 ///
 /// A kernel over what it sees and what it does not would blur light into the picture from where no pixel looks: out of a
 /// gap of which the camera sees the rim alone, from behind whatever stands before a surface.
@@ -46,8 +51,32 @@ pub fn is_in_sight(world: &World, grid: &Grid, (p, normal): (Vec3, Vec3)) -> boo
     let Some(eye) = grid.seen_from(p) else { return false };
     let (_, edge) = grid.place(&grid.voxel(p));
     // hardly aside: what is seen into a narrow gap must not depend on it
-    let start = p + (normal + (eye - p).normalize_or_zero()) * (SIGHT_LIFT * edge);
-    world.is_clear(start, eye)
+    let lift = (SIGHT_LIFT * edge).max(LEAST_SIGHT_LIFT * p.abs().max_element());
+    let direction = (eye - p).normalize_or_zero();
+    // surfaces that transmit are seen from behind, too
+    let up = if normal.dot(direction) < 0.0 { -normal } else { normal };
+    world.is_in_sight(p + (up + direction) * lift, eye)
+}
+
+/// Share of a voxel that the camera sees, of the plane that a point with its normal lies on: by a few points that are drawn
+/// for this alone.
+pub fn share_in_sight(world: &World, grid: &Grid, (p, normal): (Vec3, Vec3)) -> f32 {
+    let (low, edge) = grid.place(&grid.voxel(p));
+    let axis = normal.abs().max_position();
+    let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
+    let seed = hash(p.x.to_bits(), hash(p.y.to_bits(), p.z.to_bits()));
+    let (mut points, mut seen) = (0.0, 0.0);
+    for k in 0..SIGHT_POINTS {
+        let mut q = p;
+        q[u_axis] = low[u_axis] + edge * hash_unit(seed, 2 * k);
+        q[v_axis] = low[v_axis] + edge * hash_unit(seed, 2 * k + 1);
+        q[axis] -= (q - p).dot(normal) / normal[axis];
+        if (low[axis]..low[axis] + edge).contains(&q[axis]) {
+            points += 1.0;
+            seen += if is_in_sight(world, grid, (q, normal)) { 1.0 } else { 0.0 };
+        }
+    }
+    if points > 0.0 { seen / points } else { 1.0 }
 }
 
 /// The part of each of these points of a voxel, positions with normals, is written to `parts`. Returns how many
@@ -72,31 +101,20 @@ pub fn divide(world: &World, grid: &Grid, points: &[(Vec3, Vec3)], parts: &mut V
 /// The parts of a voxel, by their hubs.
 pub struct Division<'a> {
     world: &'a World,
-    grid: &'a Grid<'a>,
     hubs: Vec<Hub>,
-    in_sight: Option<bool>,
 }
 
 impl<'a> Division<'a> {
-    /// By the first point of each part, position with normal. `in_sight`: whether they are of what the camera sees or of
-    /// what it does not see, if that is apart.
-    pub fn new(
-        world: &'a World,
-        grid: &'a Grid,
-        firsts: impl Iterator<Item = (Vec3, Vec3)>,
-        in_sight: Option<bool>,
-    ) -> Self {
+    /// By the first point of each part, position with normal.
+    pub fn new(world: &'a World, grid: &Grid, firsts: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
         let hubs = firsts.take(MOST_PARTS - 1).map(|first| Hub::new(grid, first)).collect();
-        Self { world, grid, hubs, in_sight }
+        Self { world, hubs }
     }
 
-    /// The part to which a point belongs: the first whose hub sees it, or one that comes after those of the hubs; `None` on
-    /// the other side of sight.
-    pub fn part(&self, point: Vec3, normal: Vec3) -> Option<usize> {
-        let place = (point, normal);
-        let is_here = self.in_sight.is_none_or(|s| is_in_sight(self.world, self.grid, place) == s);
-        let seen = || self.hubs.iter().position(|hub| hub.sees(self.world, place));
-        is_here.then(|| seen().unwrap_or(self.hubs.len()))
+    /// The part to which a point belongs: the first whose hub sees it, or one that comes after those of the hubs.
+    pub fn part(&self, point: Vec3, normal: Vec3) -> usize {
+        let seen = self.hubs.iter().position(|hub| hub.sees(self.world, (point, normal)));
+        seen.unwrap_or(self.hubs.len())
     }
 }
 
@@ -130,9 +148,9 @@ mod tests {
         let mut parts = Vec::new();
         let count = divide(&world, &grid, &places, &mut parts, &ON);
         let firsts = (0..count).map(|part| parts.iter().position(|&p| usize::from(p) == part).unwrap());
-        let division = Division::new(&world, &grid, firsts.map(|k| places[k]), None);
+        let division = Division::new(&world, &grid, firsts.map(|k| places[k]));
         for (&(p, n), &part) in places.iter().zip(&parts) {
-            assert_eq!(division.part(p, n), Some(part.into()));
+            assert_eq!(division.part(p, n), usize::from(part));
         }
         (parts, count)
     }
@@ -157,6 +175,12 @@ mod tests {
             [seen(0.0, -0.9), seen(0.3, -0.5), seen(0.0, -1.1), seen(0.3, -1.9)],
             [true, true, false, false]
         );
+        // from behind, too
+        assert!(is_in_sight(&world, &grid, (Vec3::new(0.0, -0.5, -0.9), Vec3::NEG_Y)));
+        // the border of what is seen runs through one voxel and not through others
+        let share = |x: f32, z: f32| share_in_sight(&world, &grid, (Vec3::new(x, -0.5, z), Vec3::Y));
+        assert_eq!([share(0.0, -0.5), share(0.0, -1.8)], [1.0, 0.0]);
+        assert!((0.1..0.9).contains(&share(0.0, -0.949)));
         // nor is what lies behind the camera, nor what is nowhere
         assert!(!seen(0.0, 0.5) && !seen(f32::NAN, -0.9));
     }

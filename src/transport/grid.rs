@@ -103,7 +103,7 @@ impl<'a> Grid<'a> {
 
     /// Where the sight of a point from the middle of the lens ends; `None` beyond the clipping planes.
     pub fn seen_from(&self, p: Vec3) -> Option<Vec3> {
-        self.sensor.view(p, Vec2::splat(0.5)).map(|view| view.end)
+        self.sensor.view_through_middle(p).map(|view| view.end)
     }
 
     /// The key of an arrival: equal for those that share a cluster.

@@ -1,7 +1,7 @@
 //! How arrivals that share a key are laid out in clusters, one after the other.
 
 use super::Cut;
-use super::division::{MOST_PARTS, divide, is_in_sight};
+use super::division::{MOST_PARTS, divide, is_in_sight, share_in_sight};
 use super::grid::Grid;
 use super::sparse::Bits;
 use super::store::{Arrival, Arrivals};
@@ -14,7 +14,10 @@ use std::ops::Range;
 /// pair; larger ones are divided at random.
 const MOST_PAIRED: u32 = 16;
 
-/// A cluster. Its arrivals are neighbours in [`Clusters::order`]: the camera's first, then the lights'.
+/// Least share of a voxel that is in sight for which it is apart from a rest in which nothing arrived.
+const LEAST_SHARE: f32 = 0.25;
+
+/// A cluster. Its arrivals are neighbours in [`super::cluster::Clusters::order`]: the camera's first, then the lights'.
 #[derive(Clone, Copy, Debug)]
 pub struct Cluster {
     /// Place of the first arrival in the order.
@@ -104,7 +107,7 @@ pub struct Piece {
     firsts: [u32; MOST_PARTS],
     /// The part that it is in.
     pub part: u8,
-    /// Whether it is what the camera sees of its voxel, or what it does not see, where these are apart.
+    /// Whether it is what the camera sees of its voxel, or what it does not see, where that is apart.
     pub in_sight: Option<bool>,
     /// Clusters that share that part at random, itself included.
     pub sharing: u32,
@@ -121,9 +124,9 @@ impl Piece {
         self.firsts[usize::from(self.part)]
     }
 
-    /// Whether its voxel has other parts.
+    /// Whether there are several parts.
     pub fn is_divided(&self) -> bool {
-        self.in_sight.is_some() || self.firsts[1] != NOBODY
+        self.firsts[1] != NOBODY
     }
 }
 
@@ -163,14 +166,15 @@ impl Layout {
                 let count = divide(world, grid, here, &mut parts, cut);
                 layout.add(group, (&parts, count), class, in_sight);
             };
-            match by_sight(world, grid, all, group, here) {
-                None => add(group, here, None),
-                Some(seen) => {
-                    for in_sight in [true, false] {
-                        let chosen = (0..group.len()).filter(|&k| seen[k] == in_sight);
-                        let (members, places): (Vec<_>, Vec<_>) = chosen.map(|k| (group[k], here[k])).unzip();
-                        add(&members, &places, Some(in_sight));
-                    }
+            let Some(seen) = by_sight(world, grid, all, group, here, cut) else {
+                add(group, here, None);
+                continue;
+            };
+            for in_sight in [true, false] {
+                let chosen = (0..group.len()).filter(|&k| seen[k] == in_sight);
+                let (members, places): (Vec<_>, Vec<_>) = chosen.map(|k| (group[k], here[k])).unzip();
+                if !members.is_empty() {
+                    add(&members, &places, Some(in_sight));
                 }
             }
         }
@@ -229,19 +233,27 @@ impl Layout {
     }
 }
 
-/// For each of a group of arrivals, whether the camera sees its place; `None` where that is the same for all, or where the
-/// surface that pixels see goes on around all of them.
+/// For each of a group of arrivals, at one of which what pixels see ends, whether the camera sees its place; `None` where that
+/// does not divide the group.
+///
+/// It does where some are out of sight, and where a part of the voxel is, though none is there: photons that alone decided it would not
+/// be counted over the area that they have. But slivers beside what nothing reaches, as below a box on the floor, are too
+/// small for that: a photon would be very bright there.
 fn by_sight(
     world: &World,
     grid: &Grid,
     all: Numbered,
     group: &[Member],
     places: &[(Vec3, Vec3)],
+    cut: &Cut,
 ) -> Option<Vec<bool>> {
-    let from_camera = group.iter().map(|&(_, i)| i as usize).take_while(|&i| i < all.camera.len());
-    if !from_camera.into_iter().any(|i| all.ends.has(i)) {
-        return None;
-    }
-    let seen: Vec<bool> = places.iter().map(|&place| is_in_sight(world, grid, place)).collect();
-    (seen.contains(&true) && seen.contains(&false)).then_some(seen)
+    let is_end = |&(_, i): &Member| (i as usize) < all.camera.len() && all.ends.has(i as usize);
+    let end = places[group.iter().position(is_end)?];
+    let seen: Vec<bool> =
+        places.iter().map(|&place| !cut.is_raised() && is_in_sight(world, grid, place)).collect();
+    let is_apart = match seen.contains(&false) {
+        true => seen.contains(&true),
+        false => (LEAST_SHARE..1.0).contains(&share_in_sight(world, grid, end)),
+    };
+    is_apart.then_some(seen)
 }

@@ -35,8 +35,9 @@ impl Bits {
         self.len += 1;
     }
 
-    /// Adds places up to this one, which is the only yes among them.
+    /// Adds places up to this one, which comes after all there are and is the only yes among them.
     pub fn mark(&mut self, place: usize) {
+        debug_assert!(place >= self.len);
         while self.len < place {
             self.push(false);
         }

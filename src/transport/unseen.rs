@@ -4,7 +4,7 @@
 //! all of that cluster's count, too. Sets of clusters are Bloom filters: what is wrongly taken for a member costs a
 //! little time and changes nothing.
 
-use super::cluster::Numbered;
+use super::layout::Numbered;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
