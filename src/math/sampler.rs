@@ -16,6 +16,12 @@ pub fn hash(a: u32, b: u32) -> u32 {
     h ^ (h >> 15)
 }
 
+/// Mixes a point's coordinates into one word.
+#[inline]
+pub fn hash_point(p: Vec3) -> u32 {
+    hash(p.x.to_bits(), hash(p.y.to_bits(), p.z.to_bits()))
+}
+
 /// Uniform number in [0,1) from a word.
 #[inline]
 pub fn unit(word: u32) -> f32 {

@@ -33,14 +33,20 @@ impl World {
     /// Whether the camera, whose sight begins at `eye`, sees a point in space: nothing that it sees lies in between, but for
     /// what may let light through as it is.
     pub fn is_in_sight(&self, point: Vec3, eye: Vec3) -> bool {
-        let ray = Ray { t_max: 1.0, ..Ray::new(point, eye - point) };
-        if !self.needs().transparency && !self.needs().camera_visibility {
-            return !self.accel.occluded(&ray);
+        !self.is_blocked(&Ray { t_max: 1.0, ..Ray::new(point, eye - point) }, self.needs().camera_visibility)
+    }
+
+    /// Whether something lies on a ray that lets no light through as it is. `for_camera`: something that the camera sees.
+    #[inline]
+    fn is_blocked(&self, ray: &Ray, for_camera: bool) -> bool {
+        let counts = |h: &Hit| !for_camera || self.scene.group(h.instance).camera_visible;
+        let opaque =
+            |h: &Hit| !self.materials.may_be_transparent(self.scene.material_index(h.instance, h.triangle));
+        match (self.needs().transparency, for_camera) {
+            (false, false) => self.accel.occluded(ray),
+            (false, true) => self.accel.occluded_where(ray, &counts),
+            (true, _) => self.accel.occluded_where(ray, &|h| opaque(h) && counts(h)),
         }
-        !self.accel.occluded_where(&ray, &|h| {
-            let material = self.scene.material_index(h.instance, h.triangle);
-            self.scene.group(h.instance).camera_visible && !self.materials.may_be_transparent(material)
-        })
     }
 
     /// `to`: the surface at its end, unless that is a light or the camera. `for_camera`: past what the camera does not
@@ -57,20 +63,14 @@ impl World {
         *rays += 1;
         let last = to.and_then(|to| interior(to, -ray.direction));
         let left = |ray: &Ray, start, end| self.left_between(start, end, length_squared(ray).sqrt());
-        let counts = |h: &Hit| !for_camera || self.scene.group(h.instance).camera_visible;
-        if !self.needs().transparency {
-            let occluded = match for_camera {
-                false => self.accel.occluded(&ray),
-                true => self.accel.occluded_where(&ray, &counts),
-            };
-            return if occluded { Vec3::ZERO } else { left(&ray, interior(from, ray.direction), last) };
-        }
-        let opaque =
-            |h: &Hit| !self.materials.may_be_transparent(self.scene.material_index(h.instance, h.triangle));
-        // most shadow rays that are blocked are blocked by something opaque
-        if self.accel.occluded_where(&ray, &|h| opaque(h) && counts(h)) {
+        // most rays that are blocked are blocked by something opaque
+        if self.is_blocked(&ray, for_camera) {
             return Vec3::ZERO;
         }
+        if !self.needs().transparency {
+            return left(&ray, interior(from, ray.direction), last);
+        }
+        let counts = |h: &Hit| !for_camera || self.scene.group(h.instance).camera_visible;
         let (mut weight, mut inside) = (Vec3::ONE, interior(from, ray.direction));
         while let Some(hit) = self.accel.closest_where(&ray, &counts) {
             let p = SurfacePoint::new(&self.scene, &self.accel, &hit);

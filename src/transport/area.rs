@@ -2,7 +2,7 @@
 
 use super::grid::{Grid, Voxel};
 use super::store::Arrival;
-use crate::math::sampler::{hash, hash_unit};
+use crate::math::sampler::{hash, hash_point, hash_unit};
 use crate::shading::{SurfaceClass, World};
 use glam::Vec3;
 use std::ops::RangeInclusive;
@@ -86,7 +86,8 @@ impl Cell<'_> {
     /// 1945). Where that takes too many, the next one is taken to be on it: of `M` hits in `N` tries, the `k`-th is
     /// number `k (N + 1) / (M + 1)` in the mean, so the reciprocal's mean stays as it would have been.
     /// Estimates of different `wanted` are independent. `belongs`: whether a point with its normal is
-    /// in the cluster's part of the voxel; `is_shown`: whether it is on the cluster's side of sight. Adds the points that were tried to `probes`.
+    /// in the cluster's part of the voxel; `is_shown`: whether it is on the cluster's side of sight. Adds the points
+    /// that were tried to `probes`.
     pub fn coverage(
         &self,
         world: &World,
@@ -105,7 +106,7 @@ impl Cell<'_> {
         };
         let bin = self.grid.bin(ns);
         let at = self.representative.position;
-        let seed = hash(wanted, hash(at.x.to_bits(), hash(at.y.to_bits(), at.z.to_bits())));
+        let seed = hash(wanted, hash_point(at));
         let (mut sum, mut squares, mut tries, mut found) = (0.0, 0.0, 0, 0);
         let mut goal = wanted;
         let is_rough = wanted == FEW_POINTS;
@@ -188,18 +189,22 @@ pub fn unit_plane_cut(p: Vec3, n: Vec3) -> f32 {
     (0.5 * twice.abs() / n[axis].abs()).max(1e-3)
 }
 
+/// The point of the plane through `p` with normal `n` that has these coordinates along the two axes after `axis`, which
+/// does not lie in the plane.
+pub fn on_plane(p: Vec3, n: Vec3, axis: usize, [u, v]: [f32; 2]) -> Vec3 {
+    let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut q = Vec3::ZERO;
+    (q[u_axis], q[v_axis]) = (u, v);
+    q[axis] = p[axis] - (n[u_axis] * (u - p[u_axis]) + n[v_axis] * (v - p[v_axis])) / n[axis];
+    q
+}
+
 /// Corners of the polygon that the unit cube cuts out of a plane, in order.
 fn plane_cut_corners(p: Vec3, n: Vec3) -> Vec<Vec3> {
     let axis = n.abs().max_position();
-    let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
     // along the axis the cut is projected to a square, less what lies above or below the cube
-    let on_plane = |(u, v): (f32, f32)| {
-        let mut q = Vec3::ZERO;
-        (q[u_axis], q[v_axis]) = (u, v);
-        q[axis] = p[axis] - (n[u_axis] * (u - p[u_axis]) + n[v_axis] * (v - p[v_axis])) / n[axis];
-        q
-    };
-    let mut corners: Vec<Vec3> = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(on_plane).into();
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let mut corners: Vec<Vec3> = square.map(|at| on_plane(p, n, axis, at)).into();
     for above in [true, false] {
         let inside = |q: Vec3| if above { q[axis] } else { 1.0 - q[axis] };
         let mut kept = Vec::with_capacity(corners.len() + 1);

@@ -6,8 +6,9 @@
 //! hidden from it.
 
 use super::Cut;
+use super::area::on_plane;
 use super::grid::Grid;
-use crate::math::sampler::{hash, hash_unit};
+use crate::math::sampler::{hash_point, hash_unit};
 use crate::shading::World;
 use glam::Vec3;
 
@@ -64,13 +65,11 @@ pub fn share_in_sight(world: &World, grid: &Grid, (p, normal): (Vec3, Vec3)) -> 
     let (low, edge) = grid.place(&grid.voxel(p));
     let axis = normal.abs().max_position();
     let (u_axis, v_axis) = ((axis + 1) % 3, (axis + 2) % 3);
-    let seed = hash(p.x.to_bits(), hash(p.y.to_bits(), p.z.to_bits()));
+    let seed = hash_point(p);
     let (mut points, mut seen) = (0.0, 0.0);
     for k in 0..SIGHT_POINTS {
-        let mut q = p;
-        q[u_axis] = low[u_axis] + edge * hash_unit(seed, 2 * k);
-        q[v_axis] = low[v_axis] + edge * hash_unit(seed, 2 * k + 1);
-        q[axis] -= (q - p).dot(normal) / normal[axis];
+        let at = [(u_axis, 2 * k), (v_axis, 2 * k + 1)].map(|(a, n)| low[a] + edge * hash_unit(seed, n));
+        let q = on_plane(p, normal, axis, at);
         if (low[axis]..low[axis] + edge).contains(&q[axis]) {
             points += 1.0;
             seen += if is_in_sight(world, grid, (q, normal)) { 1.0 } else { 0.0 };

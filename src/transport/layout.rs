@@ -233,12 +233,12 @@ impl Layout {
     }
 }
 
-/// For each of a group of arrivals, at one of which what pixels see ends, whether the camera sees its place; `None` where that
-/// does not divide the group.
+/// For each of a group of arrivals, at one of which what pixels see ends, whether the camera sees its place; `None`
+/// where that does not divide the group.
 ///
-/// It does where some are out of sight, and where a part of the voxel is, though none is there: photons that alone decided it would not
-/// be counted over the area that they have. But slivers beside what nothing reaches, as below a box on the floor, are too
-/// small for that: a photon would be very bright there.
+/// It does where some are out of sight, and where a part of the voxel is, though none is there: photons that alone
+/// decided it would not be counted over the area that they have. But slivers beside what nothing reaches, as below a
+/// box on the floor, are too small for that: a photon would be very bright there.
 fn by_sight(
     world: &World,
     grid: &Grid,
@@ -247,8 +247,7 @@ fn by_sight(
     places: &[(Vec3, Vec3)],
     cut: &Cut,
 ) -> Option<Vec<bool>> {
-    let is_end = |&(_, i): &Member| (i as usize) < all.camera.len() && all.ends.has(i as usize);
-    let end = places[group.iter().position(is_end)?];
+    let end = places[group.iter().position(|&(_, i)| all.ends.has(i as usize))?];
     let seen: Vec<bool> =
         places.iter().map(|&place| !cut.is_raised() && is_in_sight(world, grid, place)).collect();
     let is_apart = match seen.contains(&false) {

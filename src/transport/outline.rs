@@ -16,15 +16,15 @@ pub fn clear_pixels(width: u32, sensor: &Sensor, primaries: &[Primary], arrivals
     let (width, height) = (width as usize, primaries.len() / width.max(1) as usize);
     let is_clear = |pixel: usize| {
         let seen = &primaries[pixel];
-        let Some(a) = seen.arrival.map(|a| arrivals.get(a as usize)) else { return false };
-        let reach = sensor.pixel_footprint(a.position);
+        let Some(a) = seen.arrival.map(|a| a as usize) else { return false };
+        let (class, (position, normal)) = (arrivals.class(a), arrivals.place(a));
+        let reach = sensor.pixel_footprint(position);
         let goes_on = |neighbour: usize| {
             let p = &primaries[neighbour];
             p.arrival.is_some_and(|b| {
-                let b = arrivals.get(b as usize);
-                let rise = (b.position - a.position).dot(a.normal).abs();
-                let is_alike = p.passages == seen.passages && a.class == b.class;
-                is_alike && a.normal.dot(b.normal) > SMOOTH && rise < reach
+                let (at, n) = arrivals.place(b as usize);
+                let is_alike = p.passages == seen.passages && arrivals.class(b as usize) == class;
+                is_alike && normal.dot(n) > SMOOTH && (at - position).dot(normal).abs() < reach
             })
         };
         let (x, y) = (pixel % width, pixel / width);
@@ -50,37 +50,13 @@ pub fn ends(primaries: &[Primary], is_clear: &[bool]) -> Bits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Camera;
-    use crate::shading::{Address, SurfaceClass};
-    use crate::transport::store::Arrival;
-    use glam::{Vec2, Vec3};
+    use crate::transport::testing::wall;
 
     const SIDE: u32 = 8;
 
-    /// What pixels see of a wall, orthographic and a unit to the pixel; `depth(x, y)` is where it stands, if it is there.
+    /// Which pixels are clear that see a wall, and at which arrivals it ends; `depth(x, y)` is where it stands, if it is there.
     fn clear(depth: impl Fn(u32, u32) -> Option<f32>) -> (Vec<bool>, Bits) {
-        let camera = r#"{"type":"orthographic","window":[0,8,-8,0]}"#;
-        let sensor = Sensor::new(&Camera::from_json("camera", camera).unwrap(), SIDE, SIDE);
-        let mut arrivals = Arrivals::default();
-        let mut primaries = Vec::new();
-        for (x, y) in (0..SIDE * SIDE).map(|i| (i % SIDE, i / SIDE)) {
-            let ray = sensor.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), Vec2::ZERO);
-            let arrival = depth(x, y).map(|d| {
-                arrivals.push(Arrival {
-                    position: ray.origin + ray.direction * d,
-                    normal: -ray.direction,
-                    wo: -ray.direction,
-                    at: Address { instance: 0, triangle: 0, barycentrics: Vec2::ZERO },
-                    reflectance: Vec3::ONE,
-                    back_pdf: 1.0,
-                    survival: 1.0,
-                    class: SurfaceClass::Diffuse,
-                    goes_on: false,
-                });
-                arrivals.len() as u32 - 1
-            });
-            primaries.push(Primary { arrival, ..Primary::NOTHING });
-        }
+        let (sensor, primaries, arrivals) = wall(SIDE, depth);
         let clear = clear_pixels(SIDE, &sensor, &primaries, &arrivals);
         let ends = ends(&primaries, &clear);
         (clear, ends)

@@ -1,18 +1,19 @@
 //! What the unit tests share.
 
-use super::camera::CameraSampler;
+use super::camera::{CameraSampler, Primary};
 use super::cluster::{Areas, Clusters, Numbered};
 use super::grid::Grid;
 use super::light::LightSampler;
 use super::sparse::Bits;
-use super::store::{CameraStore, LightStore};
+use super::store::{Arrival, Arrivals, CameraStore, LightStore};
 use super::{Cut, Estimator};
+use crate::film::Rect;
 use crate::math::{Sampler, warp};
 use crate::scene::mesh::MeshInput;
 use crate::scene::{Camera, InstanceGroup, SceneBuilder};
 use crate::shading::emitters::PLAIN;
-use crate::shading::{CameraRay, Sensor, World};
-use glam::Vec3;
+use crate::shading::{Address, CameraRay, Sensor, SurfaceClass, World};
+use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
 /// A camera at the origin that looks along -z.
@@ -67,6 +68,33 @@ pub fn room(wall: &str) -> World {
 /// The room's camera.
 pub fn sensor() -> Sensor {
     Sensor::new(&Camera::from_json("camera", CAMERA).unwrap(), 40, 40)
+}
+
+/// What every pixel sees of a wall, in rows of `side`, with the camera: orthographic and a unit to the pixel. `depth(x, y)` is where
+/// the wall stands, if it is there.
+pub fn wall(side: u32, depth: impl Fn(u32, u32) -> Option<f32>) -> (Sensor, Vec<Primary>, Arrivals) {
+    let camera = format!(r#"{{"type":"orthographic","window":[0,{side},-{side},0]}}"#);
+    let sensor = Sensor::new(&Camera::from_json("camera", &camera).unwrap(), side, side);
+    let (mut primaries, mut arrivals) = (Vec::new(), Arrivals::default());
+    for (x, y) in Rect::new(0, 0, side, side).pixels() {
+        let ray = sensor.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), Vec2::ZERO);
+        let arrival = depth(x, y).map(|depth| {
+            arrivals.push(Arrival {
+                position: ray.origin + ray.direction * depth,
+                normal: -ray.direction,
+                wo: -ray.direction,
+                at: Address { instance: 0, triangle: 0, barycentrics: Vec2::ZERO },
+                reflectance: Vec3::ONE,
+                back_pdf: 1.0,
+                survival: 1.0,
+                class: SurfaceClass::Diffuse,
+                goes_on: false,
+            });
+            arrivals.len() as u32 - 1
+        });
+        primaries.push(Primary { arrival, albedo: 1.0, ..Primary::NOTHING });
+    }
+    (sensor, primaries, arrivals)
 }
 
 /// Paths of both sides in such a room.

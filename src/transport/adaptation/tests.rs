@@ -1,46 +1,16 @@
 use super::*;
 use crate::math::sampler::hash_unit;
-use crate::scene::Camera;
-use crate::shading::{Address, SurfaceClass};
 use crate::transport::outline::clear_pixels;
-use crate::transport::store::Arrival;
-use crate::transport::testing::ON;
-use glam::{Vec2, Vec3};
+use crate::transport::testing::{ON, wall};
+use glam::Vec3;
 
 const SIDE: u32 = 96;
 const PICTURE: Rect = Rect::new(0, 0, SIDE, SIDE);
 
-fn sensor() -> Sensor {
-    // orthographic, a unit to the pixel
-    let camera = r#"{"type":"orthographic","window":[0,96,-96,0]}"#;
-    Sensor::new(&Camera::from_json("camera", camera).unwrap(), SIDE, SIDE)
-}
-
-/// What every pixel sees of a wall; `depth` is where it stands.
-fn wall(sensor: &Sensor, depth: impl Fn(u32, u32) -> f32) -> (Vec<Primary>, Arrivals) {
-    let arrival = |(x, y): (u32, u32)| {
-        let ray = sensor.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), Vec2::ZERO);
-        Arrival {
-            position: ray.origin + ray.direction * depth(x, y),
-            normal: -ray.direction,
-            wo: -ray.direction,
-            at: Address { instance: 0, triangle: 0, barycentrics: Vec2::ZERO },
-            reflectance: Vec3::ONE,
-            back_pdf: 1.0,
-            survival: 1.0,
-            class: SurfaceClass::Diffuse,
-            goes_on: false,
-        }
-    };
-    let seen = |i| Primary { arrival: Some(i), albedo: 1.0, ..Primary::NOTHING };
-    ((0..SIDE * SIDE).map(seen).collect(), PICTURE.pixels().map(arrival).collect())
-}
-
 /// What is found in iterations that show `light(x, y)` under noise of this width, whose share of
 /// the light is alike within 4 x 4 pixels as a kernel makes it.
 fn adapted(light: impl Fn(u32, u32) -> f32, noise: f32, depth: impl Fn(u32, u32) -> f32) -> Adaptation {
-    let sensor = sensor();
-    let (mut primaries, arrivals) = wall(&sensor, depth);
+    let (sensor, mut primaries, arrivals) = wall(SIDE, |x, y| Some(depth(x, y)));
     let mut adaptation = Adaptation::default();
     for completed in 1..=64 {
         adaptation.begin(PICTURE, completed);
