@@ -9,7 +9,8 @@ import bpy
 
 from .evaluate import Evaluator
 from .fresnel import fresnel_ior, layered
-from .tree import Stack, is_linked, resolve, socket
+from .tangents import tangent
+from .tree import Stack, resolve, socket
 from .values import KINDS, Composed, Constant, ImageValue, Value, convert, is_negative
 
 Closure = dict[str, Any]
@@ -29,13 +30,11 @@ class Shader:
     closure: str
     keys: dict[str, str]
     extra: dict[str, Any] = field(default_factory=dict)
-    ignored: dict[str, float | None] = field(default_factory=dict)
+    ignored: dict[str, float] = field(default_factory=dict)
     normals: dict[str, str] = field(default_factory=lambda: {"normal": "Normal"})
 
 
-# None: the input does nothing while it is unlinked.
-_TANGENT: dict[str, float | None] = {"Tangent": None}
-_THIN_FILM: dict[str, float | None] = {"Thin Film Thickness": 0.0}
+_THIN_FILM: dict[str, float] = {"Thin Film Thickness": 0.0}
 
 SHADERS: dict[str, Shader] = {
     "ShaderNodeBsdfDiffuse": Shader("diffuse", {"color": "Color", "roughness": "Roughness"}),
@@ -47,7 +46,6 @@ SHADERS: dict[str, Shader] = {
             "anisotropy": "Anisotropy",
             "rotation": "Rotation",
         },
-        ignored=_TANGENT,
     ),
     "ShaderNodeBsdfGlass": Shader(
         "glass", {"color": "Color", "roughness": "Roughness", "ior": "IOR"}, ignored=_THIN_FILM
@@ -68,7 +66,7 @@ SHADERS: dict[str, Shader] = {
             "rotation": "Rotation",
         },
         extra={"metallic": 1.0},
-        ignored=_TANGENT | _THIN_FILM,
+        ignored=_THIN_FILM,
     ),
     "ShaderNodeEmission": Shader(
         "emission", {"color": "Color", "strength": "Strength"}, normals={}
@@ -100,7 +98,7 @@ SHADERS: dict[str, Shader] = {
             "emission_color": "Emission Color",
             "emission_strength": "Emission Strength",
         },
-        ignored=_TANGENT | _THIN_FILM | {"Thin Wall": 0.0},
+        ignored=_THIN_FILM | {"Thin Wall": 0.0},
         normals={"normal": "Normal", "coat_normal": "Coat Normal"},
     ),
 }
@@ -222,6 +220,8 @@ class ClosureTranslator:
             if entry is not None:
                 values[key] = self.ev.value(entry, stack)
                 result[key] = self.ev.textures.json(values[key], KINDS[entry.type])
+        if values.get("anisotropy", Constant.number(0.0)) != Constant.number(0.0):
+            result["tangent"] = tangent(self.ev, node, socket(node, "Tangent"), stack)
         for key, identifier in shader.normals.items():
             normal = self._normal(socket(node, identifier), stack)
             if normal is not None:
@@ -252,12 +252,8 @@ class ClosureTranslator:
             entry = socket(node, identifier)
             if entry is None:
                 continue
-            if neutral is None:
-                active = is_linked(entry)
-            else:
-                value = self.ev.value(entry, stack)
-                active = not isinstance(value, Constant) or value.rgb[0] != neutral
-            if active:
+            value = self.ev.value(entry, stack)
+            if not isinstance(value, Constant) or value.rgb[0] != neutral:
                 self.ev.warn(node, f"'{entry.name}'", "it is left out")
         self._warn_special(node, stack)
 

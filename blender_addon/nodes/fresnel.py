@@ -1,4 +1,4 @@
-"""Mixes by a Fresnel node, which the ABI's closures hold as one layered surface."""
+"""Refraction and reflection mixed by a Fresnel node, which is glass."""
 
 from __future__ import annotations
 
@@ -29,29 +29,15 @@ def fresnel_ior(ev: Evaluator, source: Source) -> Value | None:
 def layered(
     ev: Evaluator, node: bpy.types.Node, ior: Value, a: Closure, b: Closure
 ) -> Closure | None:
-    """`b` over `a`, mixed by the Fresnel reflectance of `ior`; None for other pairs of shaders.
+    """Refraction mixed with glossy reflection by the Fresnel reflectance of `ior`: a pane of glass.
 
-    Refraction below glossy reflection is a pane of glass; diffuse below it a varnished surface.
+    None for other pairs of shaders.
     """
-    if b["type"] != "glossy":
+    if (a["type"], b["type"]) != ("refraction", "glossy"):
         return None
     index = ev.textures.json(ior, "float")
     normal = {"normal": a["normal"]} if "normal" in a else {}
-    if a["type"] == "refraction":
-        if (a["color"], a["roughness"]) != (b["color"], b["roughness"]) or a["ior"] != index:
-            ev.warn(node, "a mix of unequal refraction and reflection", "the refraction's is used")
-        keys = ("color", "roughness", "ior")
-        return {"type": "glass", **{key: a[key] for key in keys}, **normal}
-    if a["type"] == "diffuse":
-        return {
-            "type": "principled",
-            "base_color": a["color"],
-            "diffuse_roughness": a["roughness"],
-            "roughness": b["roughness"],
-            "anisotropy": b["anisotropy"],
-            "rotation": b["rotation"],
-            "specular_tint": b["color"],
-            "ior": index,
-            **normal,
-        }
-    return None
+    if (a["color"], a["roughness"]) != (b["color"], b["roughness"]) or a["ior"] != index:
+        ev.warn(node, "a mix of unequal refraction and reflection", "the refraction's is used")
+    keys = ("color", "roughness", "ior")
+    return {"type": "glass", **{key: a[key] for key in keys}, **normal}

@@ -77,7 +77,9 @@ class Translator:
             result["displacement"] = {**height, "keeps_normals": has_bumps}
         raising = set(self.textures.asked)
         self.textures.asked.clear()
-        result["surface"] = self._surface(evaluator, output, height if has_bumps else None)
+        bumps = height if has_bumps else None
+        seen = Evaluator(owner, self.textures, self._log, view=True, info=info)
+        result["surface"] = self._surface(seen, output, bumps)
         spaces = {self.textures.projections[name].space for name in self.textures.asked}
         if "displacement" in result and "object" in spaces:
             self._log.warn(
@@ -95,7 +97,7 @@ class Translator:
             self._log.warn(
                 f"{owner}: opaque shadows are not supported, its shadows are transparent"
             )
-        return result, evaluator.tells_object
+        return result, evaluator.tells_object or seen.tells_object
 
     def _surface(
         self, evaluator: Evaluator, output: bpy.types.Node, bumps: dict[str, Any] | None

@@ -28,6 +28,7 @@ from .values import (
     component,
     convert,
 )
+from .views import fresnel, geometry, layer_weight
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator
@@ -349,4 +350,7 @@ VALUE_NODES: dict[str, Handler] = {
     "ShaderNodeLightFalloff": _falloff,
     "ShaderNodeLightPath": _light_path,
     "ShaderNodeObjectInfo": _object_info,
+    "ShaderNodeFresnel": fresnel,
+    "ShaderNodeLayerWeight": layer_weight,
+    "ShaderNodeNewGeometry": geometry,
 }

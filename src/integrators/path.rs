@@ -116,7 +116,7 @@ impl PathWalk<'_, '_> {
                 let Some(hit) = hit else { break None };
                 throughput *= world.left_after(&piece, &hit);
                 let choice = if world.needs().transparency { self.sampler.next_1d() } else { 0.0 };
-                match world.shade(&hit, -piece.direction, choice) {
+                match world.shade(&hit, -piece.direction, Walk::Camera, choice) {
                     Shaded::Through { weight } => {
                         throughput *= weight;
                         piece = piece.beyond(&hit);

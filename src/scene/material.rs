@@ -1,7 +1,7 @@
 //! Materials: a small tree of closures whose parameters are constants or textures.
 
 use super::SceneError;
-use super::relief::{BumpSpace, Relief};
+use super::relief::{BumpSpace, Relief, Tangent};
 use super::value::Value;
 use glam::Vec3;
 use serde::Deserialize;
@@ -63,6 +63,8 @@ pub struct PrincipledClosure {
     pub anisotropy: Value,
     #[serde(default = "zero")]
     pub rotation: Value,
+    #[serde(default)]
+    pub tangent: Tangent,
     #[serde(default = "zero")]
     pub transmission: Value,
     #[serde(default = "zero")]
@@ -115,6 +117,8 @@ pub enum Closure {
         anisotropy: Value,
         #[serde(default = "zero")]
         rotation: Value,
+        #[serde(default)]
+        tangent: Tangent,
         #[serde(default = "yes")]
         multiscatter: bool,
         normal: Option<Relief>,
@@ -345,8 +349,9 @@ impl Closure {
             Self::Diffuse { color, roughness, .. } | Self::Sheen { color, roughness, .. } => {
                 [color, roughness].into_iter().for_each(&mut *f)
             }
-            Self::Glossy { color, roughness, anisotropy, rotation, .. } => {
-                [color, roughness, anisotropy, rotation].into_iter().for_each(&mut *f)
+            Self::Glossy { color, roughness, anisotropy, rotation, tangent, .. } => {
+                let values = [color, roughness, anisotropy, rotation];
+                values.into_iter().chain(tangent.value()).for_each(&mut *f);
             }
             Self::Glass { color, roughness, ior, .. } | Self::Refraction { color, roughness, ior, .. } => {
                 [color, roughness, ior].into_iter().for_each(&mut *f)
@@ -365,6 +370,7 @@ impl Closure {
                     specular_color,
                     anisotropy,
                     rotation,
+                    tangent,
                     transmission,
                     coat,
                     coat_roughness,
@@ -385,6 +391,7 @@ impl Closure {
                     .chain([anisotropy, rotation, transmission, coat, coat_roughness, coat_ior, coat_tint])
                     .chain([sheen, sheen_roughness, sheen_tint, emission_color, emission_strength])
                     .chain(specular_color)
+                    .chain(tangent.value())
                     .for_each(&mut *f);
             }
             Self::Mix { factor, .. } => f(factor),

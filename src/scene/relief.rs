@@ -1,7 +1,33 @@
-//! Normals that materials give to surfaces: normal maps and bump maps.
+//! Normals that materials give to surfaces, normal maps and bump maps; and tangents.
 
 use super::value::{Channel, Value};
 use serde::{Deserialize, Deserializer, de};
+
+/// Where the tangents of anisotropic surfaces come from.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tangent {
+    /// The u direction of a UV set; empty is the first one.
+    Uv(String),
+    /// A direction in the mesh's own space.
+    Along(Value),
+}
+
+impl Tangent {
+    /// The value, if it is one.
+    pub fn value(&self) -> Option<&Value> {
+        match self {
+            Self::Uv(_) => None,
+            Self::Along(v) => Some(v),
+        }
+    }
+}
+
+impl Default for Tangent {
+    fn default() -> Self {
+        Self::Uv(String::new())
+    }
+}
 
 /// The space a normal map's vectors are in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]

@@ -149,6 +149,8 @@ pub enum Texture {
         /// Value where the mesh has no such attribute.
         default: Vec4,
     },
+    /// The cosine between the direction that the surface is seen from and its shading normal, negative on its back.
+    Facing,
     /// A sum of products of others.
     Multilinear(Multilinear),
     /// A function of others.
@@ -207,6 +209,7 @@ enum Json {
         name: String,
         default: [f32; 4],
     },
+    Facing {},
     Multilinear(MultilinearJson),
     Table(TableJson),
 }
@@ -241,6 +244,7 @@ impl Texture {
             | Self::Image(_)
             | Self::Length(_)
             | Self::Attribute { .. }
+            | Self::Facing
             | Self::Multilinear(_)
             | Self::Table(_) => None,
         }
@@ -355,6 +359,7 @@ impl Texture {
                 finite("default", &default)?;
                 Ok(Self::Attribute { name: attribute, default: default.into() })
             }
+            Json::Facing {} => Ok(Self::Facing),
             Json::Multilinear(json) => Ok(Self::Multilinear(Multilinear::new(json, name, before)?)),
             Json::Table(json) => Ok(Self::Table(Table::new(json, name, images, before)?)),
         }

@@ -157,7 +157,7 @@ mod tests {
         let texture = b.add_texture("made", json).unwrap();
         let textures = TextureSet::new(Arc::new(b.build().unwrap()));
         move |u, v| {
-            let at = MeshPoint { mesh: 0, triangle: 0, barycentrics: Vec2::new(u, v) };
+            let at = MeshPoint::new(0, 0, Vec2::new(u, v));
             let value = Value::Texture { texture, channel: Channel::Rgb };
             (textures.color(&value, &at), textures.color_slopes(&value, &at))
         }
@@ -270,5 +270,21 @@ mod tests {
             }
         };
         assert!(problem.contains("at most 256") && made == 7, "{problem} {made}");
+    }
+
+    #[test]
+    fn what_is_made_of_the_direction_of_view_depends_on_it() {
+        let mut b = builder(1, 1, &[0.0]);
+        b.add_texture("facing", r#"{"type":"facing"}"#).unwrap();
+        let json = r#"{"type":"multilinear","of":[{"texture":1}],"coefficients":[[1,1,1],[2,2,2]]}"#;
+        b.add_texture("made", json).unwrap();
+        let textures = TextureSet::new(Arc::new(b.build().unwrap()));
+        let value = |texture| Value::Texture { texture, channel: Channel::R };
+        assert_eq!([0, 1, 2].map(|t| textures.looks(&value(t))), [false, true, true]);
+        assert!(!textures.looks(&Value::number(1.0)));
+        let at = MeshPoint::new(0, 0, Vec2::splat(0.3));
+        assert_eq!(textures.number(&value(2), &at), 3.0);
+        assert_eq!(textures.number(&value(2), &MeshPoint { facing: -0.25, ..at }), 0.5);
+        assert_eq!(textures.slopes(&value(2), &at), Vec2::ZERO);
     }
 }

@@ -73,7 +73,7 @@ fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, to_worl
             if std::mem::replace(&mut is_placed[v as usize], true) {
                 continue;
             }
-            let at = MeshPoint { mesh: group.mesh, triangle: t as u32, barycentrics };
+            let at = MeshPoint::new(group.mesh, t as u32, barycentrics);
             let height = textures.number(height, &at);
             let normal = normals[v as usize];
             let moved = match space {

@@ -10,15 +10,15 @@ use glam::{Vec2, Vec3};
 /// Emissive triangles beyond this number are found by hitting them only: choosing among so many costs
 /// more memory than it is worth.
 const MOST_SAMPLED_TRIANGLES: usize = 1 << 23;
-/// Points of a triangle at which its mean radiance is taken.
-const EMISSION_POINTS: [Vec2; 7] = [
-    Vec2::new(1.0 / 3.0, 1.0 / 3.0),
-    Vec2::new(0.1, 0.1),
-    Vec2::new(0.8, 0.1),
-    Vec2::new(0.1, 0.8),
-    Vec2::new(0.45, 0.45),
-    Vec2::new(0.1, 0.45),
-    Vec2::new(0.45, 0.1),
+/// Points of a triangle at which its mean radiance is taken, and cosines from which it is looked at there.
+const EMISSION_POINTS: [(Vec2, f32); 7] = [
+    (Vec2::new(1.0 / 3.0, 1.0 / 3.0), 0.5),
+    (Vec2::new(0.1, 0.1), 0.9),
+    (Vec2::new(0.8, 0.1), 0.3),
+    (Vec2::new(0.1, 0.8), 0.7),
+    (Vec2::new(0.45, 0.45), -0.5),
+    (Vec2::new(0.1, 0.45), -0.9),
+    (Vec2::new(0.45, 0.1), -0.3),
 ];
 
 /// The triangles that emit, with their mean radiance.
@@ -45,10 +45,13 @@ pub(super) fn emissive_triangles(
             if !emits[material as usize] {
                 continue;
             }
-            let at = |barycentrics| MeshPoint { mesh: group.mesh, triangle: t, barycentrics };
+            let at = |barycentrics| MeshPoint::new(group.mesh, t, barycentrics);
             let sum: Vec3 = EMISSION_POINTS
                 .into_iter()
-                .map(|b| materials.emission(material, &at(b)) * materials.opacity(material, &at(b)))
+                .map(|(b, facing)| {
+                    let facing = if group.two_sided_emission { facing } else { facing.abs() };
+                    materials.emission(material, &at(b), || facing) * materials.opacity(material, &at(b))
+                })
                 .sum();
             let corners = mesh.triangles[t as usize].map(|v| mesh.positions[v as usize]);
             let [a, b, c] = corners.map(|p| instance.to_world.transform_point3(p));

@@ -1,6 +1,8 @@
 //! Materials at a surface point: the tree of closures becomes a BSDF, an emission and a transparency.
 
-use super::bsdf::{Bsdf, BsdfBuilder, CAPACITY, MetalF90, Principled};
+use super::bsdf::{Bsdf, BsdfBuilder, CAPACITY, Cover, MetalF90, Principled};
+use super::class::SurfaceClass;
+use super::lobes::fresnel::f0_from_ior;
 use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen, Translucent};
 use super::surface::SurfacePoint;
 use super::texture::{MeshPoint, TextureSet};
@@ -9,7 +11,7 @@ use crate::scene::material::{Closure, MetalEdge, PrincipledClosure};
 use crate::scene::needs::may_be_transparent;
 use crate::scene::relief::Relief;
 use crate::scene::value::Value;
-use crate::scene::{Scene, Warnings};
+use crate::scene::{Material, Scene, Warnings};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -20,6 +22,10 @@ pub struct Materials {
     pub(super) textures: TextureSet,
     /// For each material, whether light may pass straight through.
     transparent: Vec<bool>,
+    /// For each material, whether it depends on the direction that it is seen from by its textures.
+    looks: Vec<bool>,
+    /// For each material, what [`Materials::has_views`] says.
+    views: Vec<bool>,
 }
 
 impl Materials {
@@ -33,8 +39,24 @@ impl Materials {
                 warnings.add(format!("material {:?}", m.name), problem, (most - CAPACITY) as u64);
             }
         }
-        let transparent = scene.materials.iter().map(|m| may_be_transparent(m, &scene)).collect();
-        Self { textures: TextureSet::new(scene.clone()), transparent, scene }
+        let transparent: Vec<bool> = scene.materials.iter().map(|m| may_be_transparent(m, &scene)).collect();
+        let textures = TextureSet::new(scene.clone());
+        let looks: Vec<bool> = scene.materials.iter().map(|m| looks_at_all(m, &textures)).collect();
+        let views = scene.materials.iter().zip(&looks).map(|(m, looks)| *looks || is_layered(m)).collect();
+        Self { textures, transparent, looks, views, scene }
+    }
+
+    /// Whether the direction that a material is seen from decides how much of its lobes shows.
+    #[inline]
+    pub fn has_views(&self, material: u32) -> bool {
+        self.views[material as usize]
+    }
+
+    /// How a material may share light with its neighbours.
+    pub fn class(&self, material: u32) -> SurfaceClass {
+        let class = SurfaceClass::of(&self.scene.materials[material as usize]);
+        // what is shared there is known for one direction only
+        if self.looks[material as usize] { class.max(SurfaceClass::Reflecting) } else { class }
     }
 
     /// Whether light may pass straight through a material somewhere.
@@ -43,15 +65,19 @@ impl Materials {
         self.transparent[material as usize]
     }
 
-    /// Share of the surface that is there; in `[0,1]`.
+    /// Share of the surface that is there; in `[0,1]`. It is the same from everywhere.
     pub fn opacity(&self, material: u32, at: &MeshPoint) -> f32 {
         self.textures.number(&self.scene.materials[material as usize].opacity, at).clamp(0.0, 1.0)
     }
 
-    /// Share of light that passes straight through; in `[0,1]` a channel.
-    pub fn transparency(&self, material: u32, at: &MeshPoint) -> Vec3 {
-        let opacity = self.opacity(material, at);
-        let through = self.straight(&self.scene.materials[material as usize].surface, at);
+    /// Share of light that passes straight through on its way along `wo`, towards the camera; in `[0,1]` a channel.
+    pub fn transparency(&self, p: &SurfacePoint, wo: Vec3) -> Vec3 {
+        let opacity = self.opacity(p.material, &p.at);
+        let surface = &self.scene.materials[p.material as usize].surface;
+        let through = match self.looks[p.material as usize] {
+            true => self.straight(surface, &p.seen_from(wo).at),
+            false => self.straight(surface, &p.at),
+        };
         (Vec3::splat(1.0 - opacity) + opacity * through).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
@@ -68,37 +94,52 @@ impl Materials {
         }
     }
 
-    /// Radiance that the material emits where it is, on the sides that emit. Not weighted by opacity.
-    pub fn emission(&self, material: u32, at: &MeshPoint) -> Vec3 {
-        let e = self.emitted(&self.scene.materials[material as usize].surface, at);
+    /// Radiance that the material emits where it is, on the sides that emit. Not weighted by opacity. `facing`: see
+    /// [`super::surface::facing`]; few materials ask.
+    pub fn emission(&self, material: u32, at: &MeshPoint, facing: impl Fn() -> f32) -> Vec3 {
+        let mut at = *at;
+        if self.looks[material as usize] {
+            at.facing = facing();
+        }
+        let e = self.emitted(&self.scene.materials[material as usize].surface, &at, &facing);
         // what is negative or not finite in a texture is no light
         let clean = |v: f32| if v.is_finite() { v.max(0.0) } else { 0.0 };
         Vec3::new(clean(e.x), clean(e.y), clean(e.z))
     }
 
-    fn emitted(&self, closure: &Closure, at: &MeshPoint) -> Vec3 {
+    fn emitted(&self, closure: &Closure, at: &MeshPoint, facing: &dyn Fn() -> f32) -> Vec3 {
         let product = |color: &Value, strength: &Value| match strength.is(0.0) {
             true => Vec3::ZERO,
             false => self.textures.color(color, at) * self.textures.number(strength, at),
         };
         match closure {
             Closure::Emission { color, strength } => product(color, strength),
-            Closure::Principled(p) => product(&p.emission_color, &p.emission_strength),
+            Closure::Principled(p) => match product(&p.emission_color, &p.emission_strength) {
+                // it comes from below sheen and coat
+                e if e != Vec3::ZERO && !(p.coat.is(0.0) && p.sheen.is(0.0)) => {
+                    e * self.cover(p, at).transmittance(facing().abs())
+                }
+                e => e,
+            },
             Closure::Mix { factor, a, b } => {
                 let f = self.textures.number(factor, at).clamp(0.0, 1.0);
-                self.emitted(a, at) * (1.0 - f) + self.emitted(b, at) * f
+                self.emitted(a, at, facing) * (1.0 - f) + self.emitted(b, at, facing) * f
             }
-            Closure::Add { a, b } => self.emitted(a, at) + self.emitted(b, at),
+            Closure::Add { a, b } => self.emitted(a, at, facing) + self.emitted(b, at, facing),
             _ => Vec3::ZERO,
         }
     }
 
     /// The scattering at a point. Transparent closures are not in it: they belong to visibility.
     /// `wo`: the direction it is seen from, which decides how much the layers of a principled surface hide
-    /// of each other, and how far normals of what mirrors may lean.
+    /// of each other, how far normals of what mirrors may lean, and what textures show that depend on it.
     pub fn bsdf(&self, p: &SurfacePoint, wo: Vec3) -> Bsdf {
         let mut builder = BsdfBuilder::new(p.place.normal, wo);
-        self.push(&mut builder, &self.scene.materials[p.material as usize].surface, Vec3::ONE, p);
+        let surface = &self.scene.materials[p.material as usize].surface;
+        match self.looks[p.material as usize] {
+            true => self.push(&mut builder, surface, Vec3::ONE, &p.seen_from(wo)),
+            false => self.push(&mut builder, surface, Vec3::ONE, p),
+        }
         builder.build()
     }
 
@@ -119,12 +160,12 @@ impl Materials {
                     ),
                 }
             }
-            Closure::Glossy { color: c, roughness, anisotropy, rotation, multiscatter, normal } => {
+            Closure::Glossy { color: c, roughness, anisotropy, rotation, tangent, multiscatter, normal } => {
                 let anisotropy = number(anisotropy);
                 let ggx = grain(number(roughness), anisotropy);
                 let frame = match anisotropy == 0.0 {
                     true => frame(normal),
-                    false => self.tangent_frame(normal.as_ref(), p).turned(number(rotation)),
+                    false => self.tangent_frame(normal.as_ref(), tangent, p).turned(number(rotation)),
                 };
                 let fresnel = Fresnel::constant(color(c).min(Vec3::ONE));
                 let lobe = Reflection::new(ggx, fresnel).with_multiscatter(*multiscatter);
@@ -132,8 +173,9 @@ impl Materials {
             }
             Closure::Glass { color: c, roughness, ior, multiscatter, normal } => {
                 let ggx = Ggx::from_roughness(number(roughness));
-                let lobe = Dielectric::new(ggx, sane_ior(number(ior))).with_multiscatter(*multiscatter);
-                builder.push(weight * color(c).min(Vec3::ONE), frame(normal), Lobe::Dielectric(lobe));
+                let (tint, eta) = (color(c).min(Vec3::ONE), sane_ior(number(ior)));
+                let lobe = Dielectric::tinted(ggx, eta, Vec3::splat(f0_from_ior(eta)), tint, tint);
+                builder.push(weight, frame(normal), Lobe::Dielectric(lobe.with_multiscatter(*multiscatter)));
             }
             Closure::Refraction { color: c, roughness, ior, normal } => {
                 let ggx = Ggx::from_roughness(number(roughness));
@@ -178,10 +220,10 @@ impl Materials {
         let anisotropy = number(&c.anisotropy).clamp(-1.0, 1.0);
         let frame = match anisotropy == 0.0 {
             true => self.frame(c.normal.as_ref(), p),
-            false => self.tangent_frame(c.normal.as_ref(), p),
+            false => self.tangent_frame(c.normal.as_ref(), &c.tangent, p),
         };
-        let coat = unit(&c.coat);
-        let coat_frame = match (&c.coat_normal, coat > 0.0) {
+        let cover = self.cover(c, &p.at);
+        let coat_frame = match (&c.coat_normal, cover.coat > 0.0) {
             (Some(_), true) => self.frame(c.coat_normal.as_ref(), p),
             _ => Frame::from_normal(p.ns),
         };
@@ -197,13 +239,7 @@ impl Materials {
             anisotropy,
             rotation: number(&c.rotation),
             transmission: unit(&c.transmission),
-            coat,
-            coat_roughness: unit(&c.coat_roughness),
-            coat_ior: sane_ior(number(&c.coat_ior)),
-            coat_tint: color(&c.coat_tint).min(Vec3::ONE),
-            sheen: unit(&c.sheen),
-            sheen_roughness: unit(&c.sheen_roughness),
-            sheen_tint: color(&c.sheen_tint).min(Vec3::ONE),
+            cover,
             metal_f90: match c.metal_f90 {
                 MetalEdge::White => MetalF90::White,
                 MetalEdge::Base => MetalF90::Base,
@@ -213,11 +249,44 @@ impl Materials {
         model.push(builder, weight, frame, coat_frame);
     }
 
+    fn cover(&self, c: &PrincipledClosure, at: &MeshPoint) -> Cover {
+        let tint = |v: &Value| self.textures.color(v, at).clamp(Vec3::ZERO, Vec3::ONE);
+        let unit = |v: &Value| self.textures.number(v, at).clamp(0.0, 1.0);
+        Cover {
+            coat: unit(&c.coat),
+            coat_roughness: unit(&c.coat_roughness),
+            coat_ior: sane_ior(self.textures.number(&c.coat_ior, at)),
+            coat_tint: tint(&c.coat_tint),
+            sheen: unit(&c.sheen),
+            sheen_roughness: unit(&c.sheen_roughness),
+            sheen_tint: tint(&c.sheen_tint),
+        }
+    }
+
     /// Texture coordinates of a point in the mesh's first UV set; zero without one.
     pub fn uv(&self, at: &MeshPoint) -> glam::Vec2 {
         let mesh = &self.scene.meshes[at.mesh as usize];
         mesh.uvs.first().map_or(glam::Vec2::ZERO, |(_, a)| super::texture::interpolate(a, mesh, at))
     }
+}
+
+/// Whether a material depends on the direction that it is seen from by its textures.
+fn looks_at_all(m: &Material, textures: &TextureSet) -> bool {
+    let mut looks = false;
+    m.for_each_value(&mut |v| looks |= textures.looks(v));
+    looks
+}
+
+/// Whether some lobes of a material hide others.
+fn is_layered(m: &Material) -> bool {
+    let mut layered = false;
+    m.surface.for_each(&mut |closure| {
+        if let Closure::Principled(p) = closure {
+            let is_covered = !(p.coat.is(0.0) && p.sheen.is(0.0));
+            layered |= is_covered || !(p.transmission.is(1.0) || p.metallic.is(1.0));
+        }
+    });
+    layered
 }
 
 /// Most lobes that a closure can have at one point.

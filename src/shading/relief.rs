@@ -3,7 +3,7 @@
 use super::material::Materials;
 use super::surface::{SurfacePoint, normal_matrix, normalize_any};
 use crate::math::Frame;
-use crate::scene::relief::{BumpMap, BumpSpace, NormalMap, NormalSpace, Relief};
+use crate::scene::relief::{BumpMap, BumpSpace, NormalMap, NormalSpace, Relief, Tangent};
 use glam::{Mat3, Vec2, Vec3};
 
 impl Materials {
@@ -12,11 +12,25 @@ impl Materials {
         Frame::from_normal(relief.map_or(p.ns, |relief| self.relief(relief, p)))
     }
 
-    /// The shading frame with its x axis along the u direction of the first UV set.
-    pub(super) fn tangent_frame(&self, relief: Option<&Relief>, p: &SurfacePoint) -> Frame {
+    /// The shading frame with its x axis along a tangent.
+    pub(super) fn tangent_frame(
+        &self,
+        relief: Option<&Relief>,
+        tangent: &Tangent,
+        p: &SurfacePoint,
+    ) -> Frame {
         let n = relief.map_or(p.ns, |relief| self.relief(relief, p));
-        let tangent = self.textures.uv_set("", p.at.mesh).map_or(Vec3::ZERO, |i| p.tangent(&self.scene, i));
-        Frame::from_normal_tangent(n, tangent)
+        let along = match tangent {
+            Tangent::Uv(name) => {
+                let set = self.textures.uv_set(name, p.at.mesh);
+                set.map_or(Vec3::ZERO, |set| p.tangent(&self.scene, set))
+            }
+            Tangent::Along(v) => {
+                let m = Mat3::from(self.scene.instances[p.instance as usize].to_world.matrix3);
+                normalize_any(normal_matrix(m) * self.textures.color(v, &p.at))
+            }
+        };
+        Frame::from_normal_tangent(n, along)
     }
 
     fn relief(&self, relief: &Relief, p: &SurfacePoint) -> Vec3 {

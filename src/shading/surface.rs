@@ -67,6 +67,11 @@ pub fn shading_normal(scene: &Scene, instance: u32, at: &MeshPoint, geometric: V
     if n.length_squared() > 0.5 { n * 1f32.copysign(n.dot(geometric)) } else { geometric }
 }
 
+/// Cosine between a direction and the shading normal, negative on the back of the surface.
+pub fn facing(ns: Vec3, geometric: Vec3, wo: Vec3) -> f32 {
+    ns.dot(wo).abs().copysign(geometric.dot(wo))
+}
+
 impl SurfacePoint {
     /// Where to find it again.
     pub fn address(&self) -> Address {
@@ -76,8 +81,7 @@ impl SurfacePoint {
     /// The surface where a ray hit.
     pub fn new(scene: &Scene, accel: &Accel, hit: &Hit) -> Self {
         let group = scene.group(hit.instance);
-        let at =
-            MeshPoint { mesh: group.mesh, triangle: hit.triangle, barycentrics: Vec2::new(hit.u, hit.v) };
+        let at = MeshPoint::new(group.mesh, hit.triangle, Vec2::new(hit.u, hit.v));
         let place = place(scene, accel, hit.instance, &at);
         Self {
             place,
@@ -86,6 +90,12 @@ impl SurfacePoint {
             material: scene.material_index(hit.instance, hit.triangle),
             at,
         }
+    }
+
+    /// The point, and how its surface is turned towards the direction that it is seen from.
+    pub fn seen_from(&self, wo: Vec3) -> Self {
+        let at = MeshPoint { facing: facing(self.ns, self.place.normal, wo), ..self.at };
+        Self { at, ..*self }
     }
 
     /// This point as one that light is sampled for: from all sides where its `bsdf` transmits, else from

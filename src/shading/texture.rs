@@ -19,9 +19,16 @@ pub struct MeshPoint {
     pub triangle: u32,
     /// Barycentrics of the triangle's second and third vertex.
     pub barycentrics: Vec2,
+    /// What [`Texture::Facing`] is there.
+    pub facing: f32,
 }
 
 impl MeshPoint {
+    /// A point, looked at straight on.
+    pub fn new(mesh: u32, triangle: u32, barycentrics: Vec2) -> Self {
+        Self { mesh, triangle, barycentrics, facing: 1.0 }
+    }
+
     /// Another point of the triangle.
     fn moved(&self, u: f32, v: f32) -> Self {
         Self { barycentrics: Vec2::new(u, v), ..*self }
@@ -37,6 +44,8 @@ pub struct TextureSet {
     /// For each mesh, name numbers of its UV sets and of its colours.
     uv_names: Vec<Box<[u32]>>,
     color_names: Vec<Box<[u32]>>,
+    /// For each texture, whether it depends on where the surface is seen from.
+    looks: Vec<bool>,
 }
 
 /// Share of the finest length of patterns over which they are taken for straight.
@@ -58,7 +67,17 @@ impl TextureSet {
         let uv_names = scene.meshes.iter().map(|m| m.uvs.iter().map(|(n, _)| number(n)).collect()).collect();
         let color_names =
             scene.meshes.iter().map(|m| m.colors.iter().map(|(n, _)| number(n)).collect()).collect();
-        Self { texture_names, uv_names, color_names, scene }
+        let mut looks: Vec<bool> = Vec::with_capacity(scene.textures.len());
+        for t in &scene.textures {
+            // what others are made of comes before them
+            looks.push(matches!(t, Texture::Facing) || t.made_of().iter().any(|v| is_one(&looks, v)));
+        }
+        Self { texture_names, uv_names, color_names, looks, scene }
+    }
+
+    /// Whether a value depends on where the surface is seen from.
+    pub fn looks(&self, value: &Value) -> bool {
+        is_one(&self.looks, value)
     }
 
     /// The RGBA value of a texture. An image on a mesh without the UV set reads it at (0,0).
@@ -78,6 +97,7 @@ impl TextureSet {
             Texture::Bricks(t) => bricks(t, self.place(texture, &t.place, at)),
             Texture::Length(of) => Vec3::splat(self.color(of, at).length()).extend(1.0),
             Texture::Attribute { default, .. } => self.attribute(texture, at).unwrap_or(*default),
+            Texture::Facing => Vec3::splat(at.facing).extend(1.0),
             Texture::Multilinear(t) => self.multilinear(t, at).extend(1.0),
             Texture::Table(t) => self.table(t, at).extend(1.0),
         }
@@ -142,7 +162,7 @@ impl TextureSet {
     pub(super) fn color_slopes(&self, value: &Value, at: &MeshPoint) -> [Vec3; 2] {
         let Value::Texture { texture, channel } = *value else { return [Vec3::ZERO; 2] };
         let slopes = match &self.scene.textures[texture as usize] {
-            Texture::Constant(_) => [Vec4::ZERO; 2],
+            Texture::Constant(_) | Texture::Facing => [Vec4::ZERO; 2],
             Texture::Image(t) => {
                 let Some((uv, edges)) = self.uv_slopes(texture, t, at) else { return [Vec3::ZERO; 2] };
                 let image = &self.scene.images[t.image as usize];
@@ -253,6 +273,11 @@ fn bricks(t: &BrickTexture, place: Vec3) -> Vec4 {
 /// What powers and products make of extreme values is 0 where it is not finite.
 pub(super) fn finite(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
+}
+
+/// Whether a value comes from a texture that is marked.
+fn is_one(marked: &[bool], value: &Value) -> bool {
+    matches!(*value, Value::Texture { texture, .. } if marked[texture as usize])
 }
 
 fn part(channel: Channel, v: Vec4) -> Vec3 {

@@ -2,32 +2,40 @@
 
 use super::interior::interior;
 use super::ray::LightSample;
-use super::surface::SurfacePoint;
+use super::surface::{SurfacePoint, normalize_any};
 use super::world::World;
 use crate::accel::offset::SurfacePoint as Place;
 use crate::accel::{Hit, Ray};
 use glam::Vec3;
 
+/// Where light is followed to.
+#[derive(Clone, Copy)]
+enum Goal<'a> {
+    Light,
+    Surface(&'a SurfacePoint),
+    /// Past what it does not see.
+    Camera,
+}
+
 impl World {
     /// Share of light that comes through from a sampled light to a surface point. Adds the rays it takes
     /// to `rays`.
     pub fn transmittance(&self, from: &SurfacePoint, light: &LightSample, rays: &mut u64) -> Vec3 {
-        self.comes_through(from, None, false, rays, |p| light.ray_from(p))
+        self.comes_through(from, Goal::Light, rays, |p| light.ray_from(p))
     }
 
     /// The same between two surface points.
     pub fn transmittance_between(&self, from: &SurfacePoint, to: &SurfacePoint, rays: &mut u64) -> Vec3 {
-        self.comes_through(from, Some(to), false, rays, |p| p.segment_to(&to.place))
+        self.comes_through(from, Goal::Surface(to), rays, |p| p.segment_to(&to.place))
     }
 
     /// The same from a surface point to where the camera's sight begins, `end`. What the camera does not see
     /// sends nothing, and is not in the way.
     pub fn transmittance_to_camera(&self, from: &SurfacePoint, end: Vec3, rays: &mut u64) -> Vec3 {
-        let hides = self.needs().camera_visibility;
-        if hides && !self.scene.group(from.instance).camera_visible {
+        if self.needs().camera_visibility && !self.scene.group(from.instance).camera_visible {
             return Vec3::ZERO;
         }
-        self.comes_through(from, None, hides, rays, |p| p.segment_to_point(end))
+        self.comes_through(from, Goal::Camera, rays, |p| p.segment_to_point(end))
     }
 
     /// Whether the camera, whose sight begins at `eye`, sees a point in space: nothing that it sees lies in between, but for
@@ -49,19 +57,22 @@ impl World {
         }
     }
 
-    /// `to`: the surface at its end, unless that is a light or the camera. `for_camera`: past what the camera does not
-    /// see. `ray_from`: the ray that is left from a point on it.
+    /// From a surface point to a goal. `ray_from`: the ray that is left from a point on it.
     fn comes_through(
         &self,
         from: &SurfacePoint,
-        to: Option<&SurfacePoint>,
-        for_camera: bool,
+        goal: Goal,
         rays: &mut u64,
         ray_from: impl Fn(&Place) -> Ray,
     ) -> Vec3 {
         let mut ray = ray_from(&from.place);
         *rays += 1;
-        let last = to.and_then(|to| interior(to, -ray.direction));
+        let last = match goal {
+            Goal::Surface(to) => interior(to, -ray.direction),
+            Goal::Light | Goal::Camera => None,
+        };
+        let is_sight = matches!(goal, Goal::Camera);
+        let for_camera = is_sight && self.needs().camera_visibility;
         let left = |ray: &Ray, start, end| self.left_between(start, end, length_squared(ray).sqrt());
         // most rays that are blocked are blocked by something opaque
         if self.is_blocked(&ray, for_camera) {
@@ -81,7 +92,8 @@ impl World {
             }
             let piece = Ray { t_max: hit.t, ..ray };
             weight *= left(&piece, inside, interior(&p, -ray.direction));
-            weight *= self.materials.transparency(p.material, &p.at);
+            let along = normalize_any(ray.direction);
+            weight *= self.materials.transparency(&p, if is_sight { along } else { -along });
             if weight == Vec3::ZERO {
                 return weight;
             }

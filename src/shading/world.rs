@@ -1,14 +1,14 @@
 //! The scene made ready: what integrators ask of it. Rays through holes and transparent surfaces, lights
 //! met and lights sampled, surfaces shaded.
 
-use super::bsdf::Bsdf;
+use super::bsdf::{Bsdf, Walk};
 use super::class::SurfaceClass;
 use super::displacement::displaced;
 use super::emissive::emissive_triangles;
 use super::emitters::{EmitterHit, Emitters, Incident, MeshTriangle, Receiver, SceneBounds};
 use super::material::Materials;
 use super::ray::{LightPoint, LightSample, Piece, Target};
-use super::surface::{Address, SurfacePoint, place};
+use super::surface::{Address, SurfacePoint, facing, place, shading_normal};
 use super::texture::{MeshPoint, interpolate};
 use crate::accel::offset::SurfacePoint as Place;
 use crate::accel::{Accel, AccelError, Hit, InstanceGeometry, MeshGeometry, Ray};
@@ -150,7 +150,7 @@ impl World {
         if emitters.is_empty() {
             warnings.add("scene", "nothing emits light: the picture will be black", 1);
         }
-        let classes = scene.materials.iter().map(SurfaceClass::of).collect();
+        let classes = (0..scene.materials.len() as u32).map(|m| materials.class(m)).collect();
         let absorption = absorption_coefficients(&scene, &mut warnings);
         let most_survival = survival_for(PATH_LENGTHS[0]);
         Ok(Self {
@@ -249,11 +249,7 @@ impl World {
         let mesh = &self.scene.meshes[index as usize];
         if let Some(normals) = &mesh.normals {
             let normal = |u: f32, v: f32| {
-                interpolate(
-                    normals,
-                    mesh,
-                    &MeshPoint { mesh: index, triangle, barycentrics: Vec2::new(u, v) },
-                )
+                interpolate(normals, mesh, &MeshPoint::new(index, triangle, Vec2::new(u, v)))
             };
             if normal(0.0, 0.0) != normal(1.0, 0.0) || normal(0.0, 0.0) != normal(0.0, 1.0) {
                 return None;
@@ -273,6 +269,11 @@ impl World {
     /// The scattering at a surface point that is seen along `wo`.
     pub fn bsdf(&self, p: &SurfacePoint, wo: Vec3) -> Bsdf {
         self.materials.bsdf(p, wo)
+    }
+
+    /// The same, if it may be another one than from another direction.
+    pub fn bsdf_again(&self, p: &SurfacePoint, wo: Vec3) -> Option<Bsdf> {
+        self.materials.has_views(p.material).then(|| self.bsdf(p, wo))
     }
 
     /// Whether nothing at all, transparent or not, lies between two points in space.
@@ -295,9 +296,9 @@ impl World {
         Some(SurfacePoint::new(&self.scene, &self.accel, &hit))
     }
 
-    /// What happens to a ray at a surface that is seen along `wo`. `choice`: a uniform number that
+    /// What happens to the ray of a walk at a surface that it sees along `wo`. `choice`: a uniform number that
     /// decides between passing and scattering where both are possible.
-    pub fn shade(&self, p: &SurfacePoint, wo: Vec3, choice: f32) -> Shaded {
+    pub fn shade(&self, p: &SurfacePoint, wo: Vec3, walk: Walk, choice: f32) -> Shaded {
         if !self.needs.transparency || !self.materials.may_be_transparent(p.material) {
             let emission = self.emission_towards(p, wo);
             return Shaded::Scatters {
@@ -306,7 +307,11 @@ impl World {
                 vertex: Vertex { bsdf: self.materials.bsdf(p, wo), emission },
             };
         }
-        let through = self.materials.transparency(p.material, &p.at);
+        let towards_camera = match walk {
+            Walk::Camera => wo,
+            Walk::Light => -wo,
+        };
+        let through = self.materials.transparency(p, towards_camera);
         let emission = self.emission_towards(p, wo);
         // what emits must be met now and then, however transparent it is
         let most = if emission == Vec3::ZERO { 1.0 } else { 0.5 };
@@ -342,7 +347,7 @@ impl World {
             return Vec3::ZERO;
         }
         match self.scene.group(p.instance).two_sided_emission || p.place.normal.dot(wo) > 0.0 {
-            true => self.materials.emission(p.material, &p.at),
+            true => self.materials.emission(p.material, &p.at, || facing(p.ns, p.place.normal, wo)),
             false => Vec3::ZERO,
         }
     }
@@ -428,9 +433,10 @@ impl World {
                         Some((b, (instance, triangle))) => {
                             let mesh = self.scene.group(instance).mesh;
                             let barycentrics = if self.scene.is_mirrored(instance) { b.yx() } else { b };
-                            let at = MeshPoint { mesh, triangle, barycentrics };
-                            let target = Target::Surface(place(&self.scene, &self.accel, instance, &at));
-                            (self.visible_emission(instance, &at), target)
+                            let at = MeshPoint::new(mesh, triangle, barycentrics);
+                            let place = place(&self.scene, &self.accel, instance, &at);
+                            let radiance = self.visible_emission(instance, &at, place.normal, -s.direction);
+                            (radiance, Target::Surface(place))
                         }
                     };
                 LightSample {
@@ -452,10 +458,11 @@ impl World {
         chosen.0 * self.emitters.pdf_towards(receiver, light.direction, &light.hit).0
     }
 
-    /// Emission of a triangle, as much of it as there is.
-    pub(super) fn visible_emission(&self, instance: u32, at: &MeshPoint) -> Vec3 {
+    /// Emission of a triangle of this geometric normal towards `wo`, as much of it as there is.
+    pub(super) fn visible_emission(&self, instance: u32, at: &MeshPoint, normal: Vec3, wo: Vec3) -> Vec3 {
         let material = self.scene.material_index(instance, at.triangle);
-        let emission = self.materials.emission(material, at);
+        let facing = || facing(shading_normal(&self.scene, instance, at, normal), normal, wo);
+        let emission = self.materials.emission(material, at, facing);
         match self.needs.transparency && self.materials.may_be_transparent(material) {
             true => emission * self.materials.opacity(material, at),
             false => emission,

@@ -122,7 +122,7 @@ impl Follow<'_> {
             chain.throughput *= world.left_after(&piece, &hit);
             let wo = -piece.direction;
             let choice = if world.needs().transparency { sampler.next_1d() } else { 0.0 };
-            let (vertex, opacity) = match world.shade(&hit, wo, choice) {
+            let (vertex, opacity) = match world.shade(&hit, wo, self.walk, choice) {
                 Shaded::Through { weight } => {
                     chain.throughput *= weight;
                     piece = piece.beyond(&hit);
@@ -141,7 +141,7 @@ impl Follow<'_> {
             }
             witness.surface(&hit, &vertex, wo);
             let u = if vertex.bsdf.has_delta() { sampler.next_3d() } else { Vec3::ZERO };
-            match vertex.bsdf.event(wo, self.walk, u) {
+            match vertex.bsdf.event(wo, self.walk, u, |from| world.bsdf_again(&hit, from)) {
                 Event::Absorbed => return (chain, None),
                 Event::Ends { probability: end_probability } => {
                     chain.forward *= end_probability;

@@ -114,12 +114,13 @@ fn dielectrics() -> Vec<Row> {
         for &roughness in roughnesses {
             let lobe = Lobe::Dielectric(Dielectric::new(Ggx::from_roughness(roughness), eta));
             let name = format!("dielectric {eta} {roughness}");
-            rows.push(row(&name, lobe, true, true, roughness * roughness));
+            // what is given back goes by the direction looked from
+            rows.push(row(&name, lobe, true, lobe.is_delta(), roughness * roughness));
         }
     }
     let tint = Vec3::new(0.9, 0.5, 0.2);
     let tinted = Dielectric::tinted(Ggx::new(0.2, 0.2), 1.5, tint * 0.04, Vec3::ONE, tint);
-    rows.push(row("dielectric tinted", Lobe::Dielectric(tinted), false, true, 0.2));
+    rows.push(row("dielectric tinted", Lobe::Dielectric(tinted), false, false, 0.2));
     for roughness in [1e-4f32, 0.3, 0.8] {
         let lobe = Lobe::Dielectric(Dielectric::refraction_only(Ggx::from_roughness(roughness), 1.45));
         rows.push(row(&format!("refraction {roughness}"), lobe, false, true, roughness * roughness));
@@ -130,11 +131,19 @@ fn dielectrics() -> Vec<Row> {
 fn scattering_once() -> Vec<Row> {
     let rough = Ggx::from_roughness(0.8);
     let reflection = Reflection::new(rough, Fresnel::constant(Vec3::ONE)).with_multiscatter(false);
-    let dielectric = Dielectric::new(rough, 1.5).with_multiscatter(false);
-    vec![
-        row("reflection once", Lobe::Reflection(reflection), false, true, 0.64),
-        row("dielectric once", Lobe::Dielectric(dielectric), false, true, 0.64),
-    ]
+    let mut rows = vec![row("reflection once", Lobe::Reflection(reflection), false, true, 0.64)];
+    for (eta, roughness) in [(1.1, 0.3), (1.5, 0.1), (1.5, 0.8), (2.4, 0.6), (1.0 / 1.5, 0.5)] {
+        let ggx = Ggx::from_roughness(roughness);
+        let lobe = Lobe::Dielectric(Dielectric::new(ggx, eta).with_multiscatter(false));
+        rows.push(row(
+            &format!("dielectric once {eta} {roughness}"),
+            lobe,
+            false,
+            true,
+            roughness * roughness,
+        ));
+    }
+    rows
 }
 
 fn oren_nayars() -> Vec<Row> {

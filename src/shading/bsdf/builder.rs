@@ -1,6 +1,7 @@
 //! Collecting lobes into a [`Bsdf`].
 
 use super::bend::bent;
+use super::cover::left_by;
 use super::{Bsdf, Entry};
 use crate::math::Frame;
 use crate::shading::lobes::Lobe;
@@ -8,7 +9,7 @@ use glam::Vec3;
 use smallvec::SmallVec;
 
 /// Most lobes that one surface point can have.
-pub const CAPACITY: usize = 10;
+pub const CAPACITY: usize = 16;
 
 /// Collects weighted lobes. Mixing materials is scaling the weights that they push.
 #[derive(Clone, Debug)]
@@ -44,7 +45,7 @@ impl BsdfBuilder {
         let side = 1f32.copysign(self.bsdf.ng.dot(self.wo));
         let albedo = entry.seen_from(self.wo, side).map_or(Vec3::ZERO, |o| share * lobe.albedo(o));
         self.push_entry(entry);
-        1.0 - albedo.max_element().clamp(0.0, 1.0)
+        left_by(albedo)
     }
 
     fn entry(&self, weight: Vec3, frame: Frame, lobe: Lobe) -> Entry {

@@ -12,11 +12,13 @@
 
 mod bend;
 mod builder;
+mod cover;
 pub mod principled;
 mod sight;
 mod walk;
 
 pub use builder::{BsdfBuilder, CAPACITY};
+pub use cover::Cover;
 pub use principled::{MetalF90, Principled};
 pub use sight::{Among, Sight};
 pub use walk::{Event, Passage};

@@ -6,10 +6,10 @@
 //! based shading at Imageworks"). That direction alone decides, so the stack is not reciprocal, although
 //! its lobes are; it never reflects more than it receives.
 
-use super::BsdfBuilder;
+use super::{BsdfBuilder, Cover};
 use crate::math::Frame;
 use crate::shading::lobes::fresnel::f0_from_ior;
-use crate::shading::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen};
+use crate::shading::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection};
 use glam::Vec3;
 
 /// Reflectance of the metal towards grazing angles.
@@ -48,20 +48,8 @@ pub struct Principled {
     pub rotation: f32,
     /// Share of glass in what is not metal.
     pub transmission: f32,
-    /// Weight of the coat.
-    pub coat: f32,
-    /// Roughness of the coat.
-    pub coat_roughness: f32,
-    /// Refractive index of the coat; values below one count as one.
-    pub coat_ior: f32,
-    /// Transmittance of the coat along its normal.
-    pub coat_tint: Vec3,
-    /// Weight of the sheen.
-    pub sheen: f32,
-    /// Roughness of the sheen.
-    pub sheen_roughness: f32,
-    /// Colour of the sheen.
-    pub sheen_tint: Vec3,
+    /// Sheen and coat.
+    pub cover: Cover,
     /// What the metal reflects at grazing angles.
     pub metal_f90: MetalF90,
     /// Whether what microfacets below the coat scatter more than once comes out.
@@ -74,17 +62,7 @@ const MAX_F0: f32 = 0.99;
 impl Principled {
     /// Pushes the lobes. `frame`: of the base, its x axis the tangent of the anisotropy; `coat_frame`: of the coat.
     pub fn push(&self, builder: &mut BsdfBuilder, weight: Vec3, frame: Frame, coat_frame: Frame) {
-        let mut weight = weight;
-        if self.sheen > 0.0 {
-            // fibres follow the surface that is outermost
-            let n = frame.n.lerp(coat_frame.n, self.coat).try_normalize().unwrap_or(frame.n);
-            let lobe = Lobe::Sheen(Sheen::new(self.sheen_roughness));
-            let share = self.sheen * self.sheen_tint;
-            weight *= builder.push_layer(weight, share, Frame::from_normal(n), lobe);
-        }
-        if self.coat > 0.0 {
-            weight = self.push_coat(builder, weight, coat_frame);
-        }
+        let mut weight = self.cover.push(builder, weight, frame.n, coat_frame);
         let grain = match self.anisotropy == 0.0 {
             true => (Ggx::from_roughness(self.roughness), frame),
             false => (Ggx::anisotropic(self.roughness, self.anisotropy), frame.turned(self.rotation)),
@@ -104,22 +82,6 @@ impl Principled {
             weight *= builder.push_layer(weight, Vec3::ONE, grain.1, self.reflection(grain.0, fresnel));
         }
         self.push_diffuse(builder, weight, frame);
-    }
-
-    /// Returns the weight of what is below.
-    fn push_coat(&self, builder: &mut BsdfBuilder, weight: Vec3, frame: Frame) -> Vec3 {
-        let eta = self.coat_ior.max(1.0);
-        let fresnel = Fresnel::Dielectric { eta, f0: Vec3::splat(f0_from_ior(eta)) };
-        let mut weight = weight;
-        if eta > 1.0 {
-            let lobe = Lobe::Reflection(Reflection::new(Ggx::from_roughness(self.coat_roughness), fresnel));
-            weight *= builder.push_layer(weight, Vec3::splat(self.coat), frame, lobe);
-        }
-        // Beer's law along the refracted direction, the tint being that of the shortest path
-        let cos = frame.n.dot(builder.wo()).min(1.0);
-        let cos_t = (1.0 - (1.0 - cos * cos) / (eta * eta)).max(1e-6).sqrt();
-        let tint = self.coat_tint.powf(1.0 / cos_t);
-        weight * Vec3::ONE.lerp(tint, self.coat)
     }
 
     fn metal(&self) -> Fresnel {

@@ -6,6 +6,7 @@ use crate::math::density::{DiscreteProbability, ProjectedPdf};
 use crate::shading::lobes::{Density, MIN_COS, Side};
 use glam::Vec3;
 use smallvec::SmallVec;
+use std::mem::discriminant;
 
 /// Least share of its weight at which a lobe is chosen, whatever its albedo: keeps every density with
 /// which a lobe may answer the adjoint walk well away from zero.
@@ -125,20 +126,45 @@ impl Sight<'_> {
         usable.then_some(BsdfSample { direction, value, pdf, eta: s.eta, kind: s.kind })
     }
 
-    /// What the walk does at the surface. `u` as in [`Sight::sample`].
-    pub(super) fn event(&self, walk: Walk, u: Vec3) -> Event {
+    /// What the walk does at the surface. `u` as in [`Sight::sample`]; `again` as in [`Bsdf::event`].
+    pub(super) fn event(&self, walk: Walk, u: Vec3, again: impl Fn(Vec3) -> Option<Bsdf>) -> Event {
         let (k, uz) = self.choice.pick(u.z);
         if !self.bsdf.entries()[k].delta {
             return Event::Ends { probability: self.continuous_share() };
         }
         let Some(s) = self.sample_lobe(k, walk, u.with_z(uz)) else { return Event::Absorbed };
         let forward = s.pdf.value();
+        let e = &self.bsdf.entries()[k];
+        // layers, and textures that ask, weigh the lobes by the direction looked from
+        let other = again(s.direction);
+        let back = other.as_ref().unwrap_or(self.bsdf).sight(s.direction, Among::All);
+        let (weight, chosen) = back.and_then(|back| back.counterpart(k, self)).unwrap_or_default();
         // a lobe's own choice between reflection and refraction is the same from both sides
         let within = forward / self.choice.probability(k);
-        let Some(back) = self.bsdf.sight(s.direction, Among::All) else { return Event::Absorbed };
-        let one_way = walk == Walk::Camera && self.bsdf.entries()[k].bends_from(self.bsdf.ng, s.direction);
-        let reverse = if one_way { 0.0 } else { within * back.choice.probability(k) };
-        Event::Passes(Passage { direction: s.direction, coefficient: s.value, forward, reverse, eta: s.eta })
+        let one_way = walk == Walk::Camera && e.bends_from(self.bsdf.ng, s.direction);
+        let reverse = if one_way { 0.0 } else { within * chosen };
+        let coefficient = match walk {
+            Walk::Camera => s.value,
+            // the camera's side decides
+            Walk::Light => s.value * Vec3::select(e.weight.cmpgt(Vec3::ZERO), weight / e.weight, Vec3::ZERO),
+        };
+        if coefficient == Vec3::ZERO {
+            return Event::Absorbed;
+        }
+        Event::Passes(Passage { direction: s.direction, coefficient, forward, reverse, eta: s.eta })
+    }
+
+    /// The weight of lobe `k` of another sight of the same surface, as it is seen here, and the probability of choosing it.
+    fn counterpart(&self, k: usize, of: &Sight) -> Option<(Vec3, f32)> {
+        let (entries, theirs) = (self.bsdf.entries(), of.bsdf.entries());
+        let kind = |e: &Entry| discriminant(&e.lobe);
+        let is_same = |e: &Entry| kind(e) == kind(&theirs[k]) && e.frame.n == theirs[k].frame.n;
+        // lobes that do not show from one of the two sides are missing there
+        let i = match entries.len() == theirs.len() {
+            true => k,
+            false => entries.iter().position(is_same)?,
+        };
+        Some((entries[i].weight, self.choice.probability(i)))
     }
 
     /// Probability that the choice falls on a continuous lobe.

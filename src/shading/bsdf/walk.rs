@@ -38,12 +38,13 @@ pub struct Passage {
 }
 
 impl Bsdf {
-    /// Chooses what happens to a walk that arrives from `from`. `u`: three uniform numbers of [0,1).
-    pub fn event(&self, from: Vec3, walk: Walk, u: Vec3) -> Event {
+    /// Chooses what happens to a walk that arrives from `from`. `u`: three uniform numbers of [0,1). `again`: the same BSDF
+    /// as looked at from elsewhere, if that makes a difference.
+    pub fn event(&self, from: Vec3, walk: Walk, u: Vec3, again: impl Fn(Vec3) -> Option<Self>) -> Event {
         if !self.has_delta() {
             return if self.is_black() { Event::Absorbed } else { Event::Ends { probability: 1.0 } };
         }
-        self.sight(from, Among::All).map_or(Event::Absorbed, |s| s.event(walk, u))
+        self.sight(from, Among::All).map_or(Event::Absorbed, |s| s.event(walk, u, again))
     }
 
     /// Probability that a segment which arrives from `from` ends here.

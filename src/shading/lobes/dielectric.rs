@@ -4,9 +4,7 @@
 use super::energy::GlassLoss;
 use super::fresnel::{dielectric, f0_from_ior, reflectance};
 use super::{Finish, Ggx, Kind, LobeSample, MIN_COS};
-use crate::math::ONE_MINUS_EPSILON;
 use glam::Vec3;
-use std::f32::consts::FRAC_1_PI;
 
 /// Blur of the refracted light, alpha times `|eta - 1|`, below which the interface is treated as smooth.
 const SMOOTH_BLUR: f32 = 5e-4;
@@ -73,7 +71,7 @@ impl Dielectric {
     /// transmitted.
     pub fn tinted(ggx: Ggx, eta: f32, f0: Vec3, reflection: Vec3, transmission: Vec3) -> Self {
         let ggx = finish(ggx, eta);
-        let loss = (!ggx.is_smooth()).then(|| GlassLoss::new(&ggx, eta));
+        let loss = (!ggx.is_smooth()).then(|| GlassLoss::new(&ggx, eta, transmission));
         Self { ggx, eta, split: Split::Fresnel { loss, f0, reflection, transmission } }
     }
 
@@ -155,20 +153,10 @@ impl Dielectric {
     /// A direction for the upward `o`, from the density of [`Dielectric::terms`].
     #[inline]
     fn draw(&self, o: Vec3, sign: f32, u: Vec3) -> Option<Vec3> {
-        let mut uz = u.z;
-        if let Split::Fresnel { loss: Some(loss), .. } = &self.split {
-            let dense = self.is_dense(sign);
-            let lost = loss.at(o, self.ggx.stretched(o), dense);
-            if uz < lost {
-                let d = loss.sample(u.truncate());
-                return Some(if uz < lost * loss.crossing(dense) { -d } else { d });
-            }
-            uz = ((uz - lost) / (1.0 - lost)).min(ONE_MINUS_EPSILON);
-        }
         let m = self.ggx.sample_visible(o, u.truncate());
         let c = o.dot(m);
         let facet = self.facet(c, sign);
-        if uz < facet.choice {
+        if u.z < facet.choice {
             let i = (m * (2.0 * c) - o).normalize();
             (i.z > 0.0).then_some(i)
         } else {
@@ -236,16 +224,10 @@ impl Dielectric {
             false => self.reflected((o, so), (i, si), sign),
             true => self.refracted((o, so), (i, si), sign),
         };
-        let Split::Fresnel { loss: Some(loss), reflection, transmission, .. } = &self.split else {
-            return (value, pdf);
-        };
-        let (dense_o, dense_i) = (self.is_dense(sign), self.is_dense(sign) != crosses);
-        let (lost_o, lost_i) = (loss.at(o, so, dense_o), loss.at(i, si, dense_i));
-        let crossing = loss.crossing(dense_o);
-        let (share, tint) = if crosses { (crossing, transmission) } else { (1.0 - crossing, reflection) };
-        let found = lost_o * share;
-        let value = value + tint * (found * lost_i * loss.inverse_mean(dense_i) * FRAC_1_PI);
-        (value, pdf * (1.0 - lost_o) + found * loss.pdf(i.z))
+        match &self.split {
+            Split::Fresnel { loss: Some(loss), .. } => (value * loss.scale(o, so, self.is_dense(sign)), pdf),
+            _ => (value, pdf),
+        }
     }
 
     /// Single scattering; each direction with its stretched length.

@@ -1,24 +1,25 @@
 //! Energy of rough microfacet surfaces: what single scattering loses, and how it is given back.
 //!
 //! A microfacet model that counts one bounce loses the light that meets a second facet, up to seven
-//! tenths of it. It is given back so that a lossless surface has an albedo of one in every direction, and
-//! so that the lobes stay reciprocal:
+//! tenths of it. It is given back so that a lossless surface has an albedo of one in every direction, in the
+//! shape of what is scattered once:
 //!
 //! - Reflection scales the single-scattering lobe `f1` symmetrically, `f = f1(wo, wi) s(wo) s(wi)`, with the
 //!   one function `s` for which every albedo becomes one, found by the fixed-point iteration of Sinkhorn
-//!   and Knopp (1967). The lobe keeps its shape, as with the one-sided scale `1/E(wo)` of Turquin (2019).
-//! - Refracting interfaces add a broad lobe on both sides (Kulla and Conty 2017): a scale would have to
-//!   trade reflection against refraction, and can grow without bound.
+//!   and Knopp (1967). It stays reciprocal.
+//! - Refracting interfaces are scaled by `1 / E(wo)`, what single scattering keeps of the light seen along `wo`
+//!   (Turquin 2019), as in Cycles: a symmetric scale would have to trade reflection against refraction, and a broad
+//!   lobe in its place lets light out of rough glass that would be totally reflected. As the layers of a
+//!   principled surface, that is not reciprocal; `wo` is the camera's side for every walk.
 //!
 //! The tables hold the logarithm of `s`, and the albedos of single scattering or what it loses. They are
 //! made by `tests/lobes_tables.rs`, which also checks them. Elevation enters as measured in the space
 //! where the distribution of normals is a hemisphere: so the tables have a limit as roughness goes to zero.
 
 use super::Ggx;
-use super::fresnel::{dielectric_average, stretched_dielectric};
-use glam::{Vec2, Vec3};
+use super::fresnel::stretched_dielectric;
+use glam::Vec3;
 use grid::*;
-use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// Number of nodes along the axes of the tables. Nodes are evenly spaced from zero to one.
 pub mod grid {
@@ -31,7 +32,7 @@ pub mod grid {
     /// Elevation over refracting interfaces.
     pub const GLASS_ELEVATION: usize = 64;
     /// Refractive index, as [`super::index_coordinate`].
-    pub const INDEX: usize = 24;
+    pub const INDEX: usize = 47;
     /// Square root of the cosine, for the layers' Fresnel averages.
     pub const COSINE: usize = 24;
     /// Elevation of the anisotropic table.
@@ -90,7 +91,9 @@ const fn decode(bytes: &[u8; 2 * TOTAL]) -> [f32; TOTAL] {
     let mut out = [0.0; TOTAL];
     let mut i = 0;
     while i < TOTAL {
-        out[i] = (u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]) as f32 - FIXED_ZERO) / FIXED_ONE;
+        // by hand: a call for every number is more than constants may take to evaluate
+        let fixed = bytes[2 * i] as u16 | (bytes[2 * i + 1] as u16) << 8;
+        out[i] = (fixed as f32 - FIXED_ZERO) / FIXED_ONE;
         i += 1;
     }
     out
@@ -236,46 +239,37 @@ pub(super) fn layer_fresnel(ggx: &Ggx, mu: f32, eta: f32) -> (f32, f32) {
     (look(ONCE_AT), look(MORE_AT))
 }
 
-/// What a refracting interface loses by single scattering, and where it goes.
+/// What a refracting interface loses by single scattering.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GlassLoss {
-    alpha2: f32,
-    /// `ln(1 + 1 / alpha^2)`.
-    spread: f32,
     index: Node,
     roughness: Node,
-    /// One over the mean loss on the side of the lower and of the higher index.
-    inverse_mean: [f32; 2],
-    /// Share of the lost light that comes out on the other side.
-    crossing: [f32; 2],
+    /// Tint of the light that is scattered more than once, over that of the light scattered once, on the side of the lower
+    /// and of the higher index.
+    tint: [Vec3; 2],
 }
 
 impl GlassLoss {
-    /// `eta` or its inverse: which side is which is for the methods. `ggx`: isotropic.
-    pub fn new(ggx: &Ggx, eta: f32) -> Self {
+    /// `eta` or its inverse: which side is which is for the methods. `ggx`: isotropic. `tint`: what is left of the light
+    /// after each meeting with a facet; most of it is transmitted in the end.
+    pub fn new(ggx: &Ggx, eta: f32, tint: Vec3) -> Self {
         let eta = if eta < 1.0 { 1.0 / eta } else { eta };
         let index = Node::new(index_coordinate(eta), INDEX);
         let rough = Node::new(glass_roughness_coordinate(ggx.mean_roughness()), GLASS_ROUGHNESS);
-        let mean = [0, 1].map(|side| {
+        let of_side = |side: usize| {
             let root =
                 index.lerp(|i| rough.lerp(|r| TABLES[GLASS_MEAN_AT + (i * GLASS_ROUGHNESS + r) * 2 + side]));
-            // a surface without loss has nothing to give back either
-            root.powi(4).max(1e-12)
-        });
-        // Reciprocity of the crossing light ties the two shares together: their ratio is
-        // eta^2 mean[1] / mean[0]. That of the mean Fresnel transmittances is eta^2; the larger of the
-        // shares that keep both below these is taken.
-        let t = 1.0 - dielectric_average(eta);
-        let crossing = [t * (mean[1] / mean[0]).min(1.0), t / (eta * eta) * (mean[0] / mean[1]).min(1.0)];
-        let alpha2 = ggx.alphas().x.powi(2).max(1e-10);
-        let spread = (1.0 / alpha2).ln_1p();
-        Self { alpha2, spread, index, roughness: rough, inverse_mean: mean.map(|m| 1.0 / m), crossing }
+            let lost = root.powi(4);
+            // the geometric series of Kulla and Conty 2017, its first term apart
+            tint * (1.0 - lost) / (Vec3::ONE - tint * lost)
+        };
+        Self { index, roughness: rough, tint: [0, 1].map(of_side) }
     }
 
     /// Share of the light from a direction that single scattering loses. `dense`: on the side of the
     /// higher index; `stretched`: the direction's [`Ggx::stretched`] length.
     #[inline]
-    pub fn at(&self, w: Vec3, stretched: f32, dense: bool) -> f32 {
+    fn lost(&self, w: Vec3, stretched: f32, dense: bool) -> f32 {
         let x = elevation(w, stretched, GLASS_ELEVATION);
         let root = self.index.lerp(|i| {
             self.roughness.lerp(|r| {
@@ -286,30 +280,10 @@ impl GlassLoss {
         root.powi(4)
     }
 
-    /// Share of the lost light that comes out on the other side.
+    /// Factor on what is scattered once that gives back the rest, seen from `wo`. Arguments as above.
     #[inline]
-    pub fn crossing(&self, dense: bool) -> f32 {
-        self.crossing[usize::from(dense)]
-    }
-
-    /// One over the mean loss, cosine-weighted, on a side.
-    #[inline]
-    pub fn inverse_mean(&self, dense: bool) -> f32 {
-        self.inverse_mean[usize::from(dense)]
-    }
-
-    /// An upward direction from a density close to the loss's, which goes like `1 / (cos^2 + alpha^2)`.
-    #[inline]
-    pub fn sample(&self, u: Vec2) -> Vec3 {
-        let cos2 = (self.alpha2 * (u.x * self.spread).exp_m1()).min(1.0);
-        let (sin, cos) = (TAU * u.y).sin_cos();
-        let r = (1.0 - cos2).sqrt();
-        Vec3::new(r * cos, r * sin, cos2.sqrt())
-    }
-
-    /// The density of [`GlassLoss::sample`] per projected solid angle.
-    #[inline]
-    pub fn pdf(&self, cos: f32) -> f32 {
-        FRAC_1_PI / (self.spread * (cos * cos + self.alpha2))
+    pub fn scale(&self, wo: Vec3, stretched: f32, dense: bool) -> Vec3 {
+        let lost = self.lost(wo, stretched, dense);
+        Vec3::ONE + self.tint[usize::from(dense)] * (lost / (1.0 - lost))
     }
 }

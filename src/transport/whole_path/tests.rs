@@ -51,9 +51,8 @@ fn path(world: &World, number: u32) -> Option<Vec<Point>> {
         camera.goes_on = true;
         let sample = end.vertex.bsdf.sample_continuous(end.wo, Walk::Camera, sampler.next_3d())?;
         let to_light = sample.direction;
-        let Shaded::Scatters { vertex, opacity, .. } = world.shade(&end.hit, to_light, 0.0) else {
-            return None;
-        };
+        let shaded = world.shade(&end.hit, to_light, Walk::Light, 0.0);
+        let Shaded::Scatters { vertex, opacity, .. } = shaded else { return None };
         let back = vertex.bsdf.continuous_pdf(to_light, end.wo).0;
         let light = End { hit: end.hit, vertex, wo: to_light, opacity, end_probability: 1.0 };
         let light = Arrival { goes_on: true, ..arrival(world, &light, light.sight().as_ref()) };

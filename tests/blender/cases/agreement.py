@@ -141,10 +141,10 @@ def case_a_whole_scene_by_segments() -> None:
     _a_whole_scene("segment")
 
 
-# Name -> shader node and its inputs. Both engines define these alike, but for two things that keep
-# some from being rougher or brighter here: what microfacets scatter more than once, Cycles gives
-# back in the shape of single scattering, and to brushed metals as if they were isotropic, so that
-# a white one reflects 94 % where Segue reflects all.
+# Name -> shader node and its inputs. Both engines define these alike, but for one thing that keeps
+# some from being brighter here: what microfacets scatter more than once, Cycles gives back to
+# brushed metals as if they were isotropic, so that a white one reflects 94 % where Segue reflects
+# all.
 _MATERIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "diffuse": ("BsdfDiffuse", {"Color": (0.8, 0.2, 0.1, 1)}),
     "rough diffuse": ("BsdfDiffuse", {"Color": (0.8, 0.2, 0.1, 1), "Roughness": 0.8}),
@@ -157,6 +157,7 @@ _MATERIALS: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "glass": ("BsdfGlass", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.0, "IOR": 1.5}),
     "rough glass": ("BsdfGlass", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.3, "IOR": 1.5}),
+    "very rough glass": ("BsdfGlass", {"Color": (1, 0.7, 0.4, 1), "Roughness": 0.7, "IOR": 1.5}),
     "frosted": ("BsdfRefraction", {"Color": (1, 0.9, 0.8, 1), "Roughness": 0.2, "IOR": 1.3}),
     "transparent": ("BsdfTransparent", {"Color": (0.5, 0.9, 0.8, 1)}),
     "translucent": ("BsdfTranslucent", {"Color": (0.5, 0.9, 0.8, 1)}),
@@ -178,11 +179,19 @@ _PRINCIPLED: dict[str, dict[str, Any]] = {
     "tinted specular": {"Roughness": 0.2, "Specular_Tint": (1, 0.3, 0.1, 1)},
     "glass": {"Roughness": 0.0, "Transmission_Weight": 1.0},
     "rough glass": {"Roughness": 0.2, "Transmission_Weight": 1.0},
+    "very rough glass": {"Roughness": 0.6, "Transmission_Weight": 1.0},
     "half glass": {"Roughness": 0.1, "Transmission_Weight": 0.5},
     "coat": {"Roughness": 0.6, "Coat_Weight": 1.0, "Coat_Roughness": 0.05},
     "tinted coat": {"Coat_Weight": 0.8, "Coat_Roughness": 0.3, "Coat_Tint": (0.4, 0.8, 1, 1)},
     "sheen": {"Sheen_Weight": 1.0, "Sheen_Roughness": 0.3, "Sheen_Tint": (1, 0.8, 0.6, 1)},
     "glowing": {"Emission_Color": (1, 0.5, 0.2, 1), "Emission_Strength": 2.0},
+    "glowing below layers": {
+        "Emission_Color": (1, 0.5, 0.2, 1),
+        "Emission_Strength": 2.0,
+        "Coat_Weight": 0.8,
+        "Coat_Tint": (0.4, 0.8, 1, 1),
+        "Sheen_Weight": 0.5,
+    },
     "alpha": {"Alpha": 0.4},
     "brushed": {"Metallic": 1.0, "Roughness": 0.3, "Anisotropic": 0.8},
 }
@@ -193,6 +202,7 @@ _GLASS_LIMITS = (512, 0.007, 0.015, 0.999)
 _LIMITS_OF = {
     "glass": _GLASS_LIMITS,
     "rough glass": _GLASS_LIMITS,
+    "very rough glass": _GLASS_LIMITS,
     "half glass": _GLASS_LIMITS,
     "frosted": _GLASS_LIMITS,
     "brushed": (256, 0.01, 0.015, 0.9995),
@@ -244,6 +254,84 @@ def case_shaders_one_by_one() -> None:
 def case_principled_one_by_one() -> None:
     base = {"Base_Color": (0.6, 0.3, 0.1, 1)}
     _each({name: ("BsdfPrincipled", base | extra) for name, extra in _PRINCIPLED.items()})
+
+
+def _factor(tree: bpy.types.NodeTree, kind: str, output: str, **inputs: float) -> Any:
+    """The output of a node that asks where the surface is seen from."""
+    node = tree.nodes.new(f"ShaderNode{kind}")
+    for name, value in inputs.items():
+        node.inputs[name].default_value = value
+    return node.outputs[output]
+
+
+def case_surfaces_look_different_from_aside() -> None:
+    """Colours, emission and mixes, also with what lets light through as it is."""
+    rim = ("LayerWeight", "Facing", {"Blend": 0.8})
+    for below, above, (kind, output, inputs), integrator in (
+        ("BsdfDiffuse", "BsdfAnisotropic", ("Fresnel", "Fac", {"IOR": 1.8}), "path"),
+        ("BsdfTransparent", "BsdfDiffuse", ("Fresnel", "Fac", {"IOR": 1.5}), "path"),
+        ("BsdfDiffuse", "Emission", rim, "path"),
+        ("BsdfDiffuse", "BsdfAnisotropic", ("LayerWeight", "Fresnel", {"Blend": 0.6}), "segment"),
+        ("BsdfTransparent", "BsdfAnisotropic", rim, "segment"),
+        ("BsdfGlass", "BsdfAnisotropic", rim, "path"),
+    ):
+        _stage("BsdfDiffuse", {})
+        tree = bpy.data.materials["Tested"].node_tree
+        tree.nodes.clear()
+        mix, end = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(_factor(tree, kind, output, **inputs), mix.inputs[0])
+        for index, shader in enumerate((below, above), 1):
+            node = tree.nodes.new(f"ShaderNode{shader}")
+            node.inputs["Color"].default_value = (
+                (0.9, 0.3, 0.1, 1) if index == 1 else (0.2, 0.5, 1, 1)
+            )
+            tree.links.new(node.outputs[0], mix.inputs[index])
+        tree.links.new(mix.outputs[0], end.inputs["Surface"])
+        found = agreement.compare(*agreement.render_both(64, 48, 256, 256, integrator))
+        print(below, above, kind, output, integrator)
+        _check(found, mean=0.005, blocks=0.015, correlation=0.999)
+
+
+def case_the_inside_of_a_bowl_is_not_its_outside() -> None:
+    _stage("BsdfDiffuse", {})
+    tree = bpy.data.materials["Tested"].node_tree
+    diffuse = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
+    ramp = tree.nodes.new("ShaderNodeValToRGB")
+    ramp.color_ramp.elements[0].color = (0.8, 0.1, 0.1, 1)
+    tree.links.new(_factor(tree, "NewGeometry", "Backfacing"), ramp.inputs[0])
+    tree.links.new(ramp.outputs["Color"], diffuse.inputs["Color"])
+    import bmesh
+
+    data = bpy.data.objects["Ball"].data
+    bowl = bmesh.new()
+    bowl.from_mesh(data)
+    gone = [vertex for vertex in bowl.verts if vertex.co.z > 0.1]
+    bmesh.ops.delete(bowl, geom=gone, context="VERTS")
+    bowl.to_mesh(data)
+    _check_floor("bowl")
+
+
+def case_brushes_go_around_an_axis() -> None:
+    """By default around z, whatever the UV map says; or around another axis, or along the map."""
+    for direction in ("", "X", "UV_MAP"):
+        _stage("BsdfPrincipled", {"Base_Color": (0.3, 0.2, 0.1, 1), "Metallic": 1.0})
+        tested = bpy.data.materials["Tested"]
+        node = next(n for n in tested.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled")
+        node.inputs["Roughness"].default_value = 0.3
+        node.inputs["Anisotropic"].default_value = 0.8
+        if direction:
+            tangent = tested.node_tree.nodes.new("ShaderNodeTangent")
+            tangent.direction_type = "UV_MAP" if direction == "UV_MAP" else "RADIAL"
+            if direction != "UV_MAP":
+                tangent.axis = direction
+            tested.node_tree.links.new(tangent.outputs[0], node.inputs["Tangent"])
+        # around an axis in its own plane a flat thing has no direction
+        if direction != "X":
+            bpy.data.objects["Floor"].data.materials[0] = tested
+        bpy.data.objects["Ball"].rotation_euler = (0.5, 0.4, 0.3)
+        found = agreement.compare(*agreement.render_both(64, 48, 256, 256))
+        print(direction or "default")
+        _check(found, mean=0.01, blocks=0.015, correlation=0.9995)
 
 
 def case_white_metals_reflect_all_light() -> None:

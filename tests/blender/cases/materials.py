@@ -112,6 +112,8 @@ def case_no_socket_of_principled_is_forgotten() -> None:
         known = set(shader.keys.values()) | set(shader.normals.values()) | set(shader.ignored)
         if kind == "ShaderNodeBsdfPrincipled":
             known |= {"Alpha"}
+        if "anisotropy" in shader.keys:
+            known |= {"Tangent"}
         if "Thin Film Thickness" in known:
             known |= {"Thin Film IOR"}  # does nothing without a film
         known |= {"Weight"}  # hidden in every node, for node groups' sake
@@ -185,18 +187,26 @@ def case_fresnel_mixes_are_layers() -> None:
     _close((surface["ior"], surface["roughness"]), (1.4, 0.1))
     glossy.inputs["Roughness"].default_value = 0.3
     assert any("unequal" in text for text in tree.export()[2])
-    # Diffuse below a varnish, by the Layer Weight node this time.
-    weight, diffuse = tree.node("LayerWeight", Blend=0.2), tree.node("BsdfDiffuse")
-    tree.link(weight.outputs["Fresnel"], mix.inputs[0])
-    tree.link(diffuse.outputs[0], mix.inputs[1])
-    surface, _, warnings = tree.export()
-    assert surface["type"] == "principled" and not warnings, warnings
-    _close((surface["ior"], surface["roughness"]), (1.25, 0.3))
-    _close(surface["specular_tint"], (0.9, 0.8, 0.7))
-    # Any other pair keeps the plain mix, with a constant factor that is named.
+    # With something else in place of the reflection it stays a mix.
     tree.link(tree.node("Emission").outputs[0], mix.inputs[2])
     surface, _, warnings = tree.export()
-    assert surface["type"] == "mix" and len(warnings) == 1, warnings
+    assert surface["type"] == "mix" and not warnings, warnings
+
+
+def case_the_direction_of_view_is_a_texture() -> None:
+    tree = Tree()
+    mix, weight = tree.surface(tree.node("MixShader")), tree.node("LayerWeight", Blend=0.2)
+    tree.link(weight.outputs["Fresnel"], mix.inputs[0])
+    tree.link(tree.node("BsdfDiffuse").outputs[0], mix.inputs[1])
+    tree.link(tree.node("BsdfTransparent").outputs[0], mix.inputs[2])
+    surface, scene, warnings = tree.export()
+    assert not warnings, warnings
+    table = scene.textures[surface["factor"]["texture"]][1]
+    assert table["type"] == "table" and table["domain"] == [[-1.0, 1.0]]
+    assert scene.textures[table["of"][0]["texture"]][1] == {"type": "facing"}
+    # A normal of the node's own is not followed.
+    tree.link(tree.node("Bump").outputs[0], weight.inputs["Normal"])
+    assert any("normal of its own" in text for text in tree.export()[2])
 
 
 def case_reroutes_mutes_and_groups() -> None:

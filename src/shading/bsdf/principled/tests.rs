@@ -20,13 +20,15 @@ fn white() -> Principled {
         anisotropy: 0.0,
         rotation: 0.0,
         transmission: 0.0,
-        coat: 0.0,
-        coat_roughness: 0.03,
-        coat_ior: 1.5,
-        coat_tint: Vec3::ONE,
-        sheen: 0.0,
-        sheen_roughness: 0.5,
-        sheen_tint: Vec3::ONE,
+        cover: Cover {
+            coat: 0.0,
+            coat_roughness: 0.03,
+            coat_ior: 1.5,
+            coat_tint: Vec3::ONE,
+            sheen: 0.0,
+            sheen_roughness: 0.5,
+            sheen_tint: Vec3::ONE,
+        },
         metal_f90: MetalF90::White,
         multiscatter: true,
     }
@@ -61,16 +63,16 @@ fn never_reflects_more_than_it_receives() {
         ("half metal", |p| p.metallic = 0.5),
         ("glass", |p| p.transmission = 1.0),
         ("half glass", |p| p.transmission = 0.5),
-        ("coat", |p| p.coat = 1.0),
-        ("half rough coat", |p| (p.coat, p.coat_roughness) = (0.5, 0.4)),
-        ("sheen", |p| p.sheen = 1.0),
+        ("coat", |p| p.cover.coat = 1.0),
+        ("half rough coat", |p| (p.cover.coat, p.cover.coat_roughness) = (0.5, 0.4)),
+        ("sheen", |p| p.cover.sheen = 1.0),
         ("anisotropic", |p| (p.anisotropy, p.rotation) = (0.8, 0.1)),
         ("high index", |p| p.ior = 2.5),
         ("low index", |p| p.ior = 0.7),
         ("specular colour", |p| p.specular_color = Some(Vec3::new(0.9, 0.5, 0.0))),
         ("strong specular", |p| p.specular_level = 1.0),
         ("everything", |p| {
-            (p.metallic, p.transmission, p.coat, p.sheen) = (0.3, 0.4, 0.7, 0.6);
+            (p.metallic, p.transmission, p.cover.coat, p.cover.sheen) = (0.3, 0.4, 0.7, 0.6);
             (p.diffuse_roughness, p.anisotropy) = (0.5, -0.5);
         }),
     ];
@@ -111,7 +113,7 @@ fn is_exactly_lambert_without_a_specular_lobe() {
 #[test]
 fn the_density_integrates_to_the_share_of_draws_that_succeed() {
     let mut p = white();
-    (p.metallic, p.coat, p.coat_roughness, p.sheen) = (0.3, 0.7, 0.4, 0.6);
+    (p.metallic, p.cover.coat, p.cover.coat_roughness, p.cover.sheen) = (0.3, 0.7, 0.4, 0.6);
     (p.diffuse_roughness, p.anisotropy) = (0.5, 0.5);
     let wo = direction(0.6, 0.4);
     let bsdf = build(&p, wo);
@@ -131,12 +133,12 @@ fn each_layer_hides_what_is_below() {
     let mut p = white();
     p.ior = 1.0;
     let bare = build(&p, wo).eval(wo, wi);
-    (p.coat, p.coat_roughness) = (1.0, 0.0);
+    (p.cover.coat, p.cover.coat_roughness) = (1.0, 0.0);
     let coated = build(&p, wo).eval(wo, wi);
     // the mirror of the coat does not show; what it reflects is missing below
     let f = crate::shading::lobes::fresnel::dielectric(0.5, 1.5).0;
     assert!(coated.abs_diff_eq(bare * (1.0 - f), 2e-3), "{coated} {bare}");
-    p.coat_tint = Vec3::new(0.5, 1.0, 0.0);
+    p.cover.coat_tint = Vec3::new(0.5, 1.0, 0.0);
     let tinted = build(&p, wo).eval(wo, wi) / coated;
     let cos_t = (1.0 - 0.75 / 2.25f32).sqrt();
     assert!(tinted.abs_diff_eq(Vec3::new(0.5f32.powf(1.0 / cos_t), 1.0, 0.0), 1e-5), "{tinted}");
@@ -148,4 +150,24 @@ fn index_and_normal_reflectance_are_inverses() {
         approx::assert_abs_diff_eq!(ior_from_f0(f0_from_ior(eta)), eta, epsilon = 1e-5);
     }
     assert!(ior_from_f0(5.0).is_finite());
+}
+
+/// What shines from below sheen and coat comes through as what is reflected there.
+#[test]
+fn layers_let_light_out_as_they_let_it_in() {
+    let (wi, color) = (Vec3::new(0.3, 0.1, 0.9).normalize(), Vec3::new(0.4, 0.5, 0.6));
+    let bare = Principled { specular_level: 0.0, base_color: color, ..white() };
+    let mut covered = bare;
+    (covered.cover.coat, covered.cover.coat_roughness) = (0.8, 0.0);
+    (covered.cover.coat_tint, covered.cover.sheen) = (Vec3::new(0.9, 0.5, 0.1), 0.7);
+    let mut sheen = covered;
+    sheen.cover.coat = 0.0;
+    for cos in [0.02, 0.3, 0.8, 1.0_f32] {
+        let wo = Vec3::new(0.0, (1.0 - cos * cos).sqrt(), cos);
+        // the mirror of the coat does not show; the sheen itself does
+        let fibres = build(&sheen, wo).eval(wo, wi) - color * FRAC_1_PI * sheen.cover.transmittance(cos);
+        let left = (build(&covered, wo).eval(wo, wi) - fibres) / (color * FRAC_1_PI);
+        let told = covered.cover.transmittance(cos);
+        assert!(left.abs_diff_eq(told, 1e-4), "{cos}: {left} {told}");
+    }
 }
