@@ -108,13 +108,13 @@ impl Cell<'_> {
         let at = self.representative.position;
         let seed = hash(wanted, hash_point(at));
         let (mut sum, mut squares, mut tries, mut found) = (0.0, 0.0, 0, 0);
-        let mut goal = wanted;
         let is_rough = wanted == FEW_POINTS;
-        let mut most = match (is_rough, self.is_cut) {
-            (true, false) => FEW_TRIES,
-            // a photon in a sliver that were taken to be large would keep its weight over a tiny area
-            (true, true) => TRIES[1],
-            (false, _) => TRIES[0],
+        let (mut goal, mut most) = match (is_rough, self.is_cut) {
+            (true, false) => (wanted, FEW_TRIES),
+            // a photon in a sliver that were taken to be large would keep its weight over a tiny area; the first point
+            // may come a hundred times too early, the fourth hardly ever
+            (true, true) => (ENOUGH, TRIES[1]),
+            (false, _) => (wanted, TRIES[0]),
         };
         while found < goal && tries < most {
             let [u, v, choice] = std::array::from_fn(|k| hash_unit(seed, 3 * tries + k as u32));
