@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from .evaluate import Evaluator
-from .fresnel import fresnel_ior, layered
+from .fresnel import fresnel_ior, glass
 from .tangents import tangent
 from .tree import Stack, resolve, socket
 from .values import KINDS, Composed, Constant, ImageValue, Value, convert, is_negative
@@ -169,7 +169,7 @@ class ClosureTranslator:
         ior = fresnel_ior(self.ev, resolve(node.inputs[0], stack))
         if ior is not None:
             parts = [self.closure(entry, stack) for entry in node.inputs[1:]]
-            surface = layered(self.ev, node, ior, *parts)
+            surface = glass(self.ev, node, ior, *parts)
             if surface is not None:
                 return surface
         factor = self.ev.value(node.inputs[0], stack)

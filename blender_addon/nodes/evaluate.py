@@ -58,24 +58,22 @@ class Evaluator:
         *,
         world: bool = False,
         camera: bool | None = None,
-        view: bool = False,
         info: ObjectInfo | None = None,
     ) -> None:
         """`camera`: whether it is for rays from the camera, where these are told from others.
 
-        `view`: whether the direction counts that it is seen from. `info`: what is known of the
-        object.
+        `info`: what is known of the object.
         """
         self.owner = owner
         self.textures = textures
         self.log = log
         self.world = world
         self.camera = camera
-        self.view = view
         self.info = info
-        #: Whether a value depends on the camera, on the direction and on the object.
+        #: Whether the direction counts that a surface is seen from.
+        self.view = False
+        #: Whether a value depends on the camera, and on the object.
         self.tells_camera = False
-        self.tells_view = False
         self.tells_object = False
         #: What is said where a pattern of a world is simplified: it may yet become a picture.
         self.simplified: list[str] = []

@@ -9,6 +9,7 @@ import bpy
 from .evaluate import Evaluator
 from .tree import Source
 from .values import Constant, Value
+from .views import ior_of_blend
 
 Closure = dict[str, Any]
 
@@ -22,11 +23,11 @@ def fresnel_ior(ev: Evaluator, source: Source) -> Value | None:
         return ev.value(node.inputs["IOR"], source.stack)
     if node.bl_idname == "ShaderNodeLayerWeight" and source.output.identifier == "Fresnel":
         blend = ev.number(node.inputs["Blend"], source.stack)
-        return Constant.number(1.0 / max(1.0 - blend, 1e-5))
+        return Constant.number(float(ior_of_blend(blend)))
     return None
 
 
-def layered(
+def glass(
     ev: Evaluator, node: bpy.types.Node, ior: Value, a: Closure, b: Closure
 ) -> Closure | None:
     """Refraction mixed with glossy reflection by the Fresnel reflectance of `ior`: a pane of glass.

@@ -75,11 +75,14 @@ class Translator:
         has_bumps = bool(height and method != "DISPLACEMENT" and isinstance(height["height"], dict))
         if height and method != "BUMP":
             result["displacement"] = {**height, "keeps_normals": has_bumps}
+        inside = absorption(evaluator, socket(output, "Volume"))
+        if inside.any():
+            result["absorption"] = inside.tolist()
         raising = set(self.textures.asked)
         self.textures.asked.clear()
-        bumps = height if has_bumps else None
-        seen = Evaluator(owner, self.textures, self._log, view=True, info=info)
-        result["surface"] = self._surface(seen, output, bumps)
+        # What both look up is evaluated once, so of what moves the surface it is not asked.
+        evaluator.view = True
+        result["surface"] = self._surface(evaluator, output, height if has_bumps else None)
         spaces = {self.textures.projections[name].space for name in self.textures.asked}
         if "displacement" in result and "object" in spaces:
             self._log.warn(
@@ -87,9 +90,6 @@ class Translator:
                 "those before its displacement are used"
             )
         self.textures.asked |= raising
-        inside = absorption(evaluator, socket(output, "Volume"))
-        if inside.any():
-            result["absorption"] = inside.tolist()
         # Blender 4.2 moved this switch from Cycles' settings.
         if not getattr(material, "use_transparent_shadow", True) and _lets_through(
             result["surface"]
@@ -97,7 +97,7 @@ class Translator:
             self._log.warn(
                 f"{owner}: opaque shadows are not supported, its shadows are transparent"
             )
-        return result, evaluator.tells_object or seen.tells_object
+        return result, evaluator.tells_object
 
     def _surface(
         self, evaluator: Evaluator, output: bpy.types.Node, bumps: dict[str, Any] | None

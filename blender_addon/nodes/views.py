@@ -47,7 +47,6 @@ def _facing(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket) -
         raise UnsupportedError(f"the output '{output.name}'")
     if "Normal" in node.inputs and is_linked(node.inputs["Normal"]):
         ev.warn(node, "a normal of its own", "the surface's is used")
-    ev.tells_view = True
     return PatternValue("Facing", {"type": "facing"}, {}, (-1.0, 1.0), "float", "r")
 
 
@@ -61,8 +60,13 @@ def _reflectance(facing: np.ndarray, ior: np.ndarray) -> np.ndarray:
     return np.where(g > 0.0, 0.5 * across**2 * (1.0 + along**2), 1.0)
 
 
+def ior_of_blend(blend: np.ndarray | float) -> np.ndarray:
+    """The refractive index that Layer Weight's reflectance is of."""
+    return 1.0 / np.maximum(1.0 - blend, 1e-5)
+
+
 def _reflectance_of_blend(facing: np.ndarray, blend: np.ndarray) -> np.ndarray:
-    return _reflectance(facing, 1.0 / np.maximum(1.0 - blend, 1e-5))
+    return _reflectance(facing, ior_of_blend(blend))
 
 
 def _edge(facing: np.ndarray, blend: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ use super::bsdf::{Bsdf, BsdfBuilder, CAPACITY, Cover, MetalF90, Principled};
 use super::class::SurfaceClass;
 use super::lobes::fresnel::f0_from_ior;
 use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen, Translucent};
-use super::surface::SurfacePoint;
+use super::surface::{SurfacePoint, normalize_any};
 use super::texture::{MeshPoint, TextureSet};
 use crate::math::Frame;
 use crate::scene::material::{Closure, MetalEdge, PrincipledClosure};
@@ -70,12 +70,13 @@ impl Materials {
         self.textures.number(&self.scene.materials[material as usize].opacity, at).clamp(0.0, 1.0)
     }
 
-    /// Share of light that passes straight through on its way along `wo`, towards the camera; in `[0,1]` a channel.
+    /// Share of light that passes straight through on its way along `wo`, of any length, towards the camera; in
+    /// `[0,1]` a channel.
     pub fn transparency(&self, p: &SurfacePoint, wo: Vec3) -> Vec3 {
         let opacity = self.opacity(p.material, &p.at);
         let surface = &self.scene.materials[p.material as usize].surface;
         let through = match self.looks[p.material as usize] {
-            true => self.straight(surface, &p.seen_from(wo).at),
+            true => self.straight(surface, &p.seen_from(normalize_any(wo)).at),
             false => self.straight(surface, &p.at),
         };
         (Vec3::splat(1.0 - opacity) + opacity * through).clamp(Vec3::ZERO, Vec3::ONE)
@@ -116,9 +117,7 @@ impl Materials {
             Closure::Emission { color, strength } => product(color, strength),
             Closure::Principled(p) => match product(&p.emission_color, &p.emission_strength) {
                 // it comes from below sheen and coat
-                e if e != Vec3::ZERO && !(p.coat.is(0.0) && p.sheen.is(0.0)) => {
-                    e * self.cover(p, at).transmittance(facing().abs())
-                }
+                e if e != Vec3::ZERO && is_covered(p) => e * self.cover(p, at).transmittance(facing().abs()),
                 e => e,
             },
             Closure::Mix { factor, a, b } => {
@@ -277,13 +276,17 @@ fn looks_at_all(m: &Material, textures: &TextureSet) -> bool {
     looks
 }
 
+/// Whether sheen or a coat may lie over the rest.
+fn is_covered(p: &PrincipledClosure) -> bool {
+    !(p.coat.is(0.0) && p.sheen.is(0.0))
+}
+
 /// Whether some lobes of a material hide others.
 fn is_layered(m: &Material) -> bool {
     let mut layered = false;
     m.surface.for_each(&mut |closure| {
         if let Closure::Principled(p) = closure {
-            let is_covered = !(p.coat.is(0.0) && p.sheen.is(0.0));
-            layered |= is_covered || !(p.transmission.is(1.0) || p.metallic.is(1.0));
+            layered |= is_covered(p) || !(p.transmission.is(1.0) || p.metallic.is(1.0));
         }
     });
     layered

@@ -2,7 +2,7 @@
 
 use super::interior::interior;
 use super::ray::LightSample;
-use super::surface::{SurfacePoint, normalize_any};
+use super::surface::SurfacePoint;
 use super::world::World;
 use crate::accel::offset::SurfacePoint as Place;
 use crate::accel::{Hit, Ray};
@@ -92,8 +92,8 @@ impl World {
             }
             let piece = Ray { t_max: hit.t, ..ray };
             weight *= left(&piece, inside, interior(&p, -ray.direction));
-            let along = normalize_any(ray.direction);
-            weight *= self.materials.transparency(&p, if is_sight { along } else { -along });
+            let towards_camera = if is_sight { ray.direction } else { -ray.direction };
+            weight *= self.materials.transparency(&p, towards_camera);
             if weight == Vec3::ZERO {
                 return weight;
             }
