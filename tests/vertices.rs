@@ -276,6 +276,24 @@ fn surfaces_that_look_different_from_aside_agree() {
     }
 }
 
+/// A side's own colour, by its normal: below the sheet other than above, in a class that shares light with its neighbours.
+#[test]
+fn sides_that_differ_agree() {
+    let textures = [
+        r#"{"type":"geometry","of":"normal"}"#,
+        r#"{"type":"multilinear","of":[{"texture":0}],"coefficients":[[0.5,0.5,0.5],[0.4,0.4,0.4]]}"#,
+    ];
+    for other in ["", r#","opacity":0.5"#] {
+        let sided =
+            format!(r#"{{"surface":{{"type":"diffuse","color":{{"texture":1,"channel":"b"}}}}{other}}}"#);
+        let mut s = yard_with(&textures, &sided, &sided);
+        s.light(&rect());
+        let sheet = s.material(&sided);
+        s.quad([[-1., -0.2, 0.9], [0.2, -0.2, 0.9], [0.2, 0.9, 1.1], [-1., 0.9, 1.1]], sheet);
+        compare(other, &s, ALL, (24, 24), "");
+    }
+}
+
 /// Glass around something else, so that light is inside of the glass both on its way between two of its own points and
 /// from a point of it to another surface.
 #[test]

@@ -46,6 +46,7 @@ class Exporter:
         if found is None:
             return False
         self._translator.textures.extent = found.extent
+        self._translator.textures.reach = found.reach
         # Materials come first: they tell which attributes of the meshes are read.
         slots = [
             [

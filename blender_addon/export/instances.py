@@ -46,11 +46,12 @@ class ObjectTraits:
 class Group:
     """Instances of one mesh that share materials, what these ask of objects, and visibility.
 
-    `members` are indices into the depsgraph's list.
+    `corners` (8, 3): of the mesh's bounding box. `members` are indices into the depsgraph's list.
     """
 
     traits: ObjectTraits
     mesh: bpy.types.Mesh
+    corners: np.ndarray
     members: list[int] = field(default_factory=list)
 
 
@@ -71,8 +72,9 @@ class Survey:
     groups: list[Group]
     lights: list[LightInstance]
     matrices: np.ndarray
-    #: How far meshes reach from their origins along an axis, one unit at least.
+    #: How far meshes reach along an axis, from their origins and from the scene's: at least 1.
     extent: float
+    reach: float
 
 
 def _camera_visible(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
@@ -129,7 +131,6 @@ class _Surveyor:
         # What each material asks of objects, and what those of an object and its mesh do.
         self.asked: dict[int, frozenset[str]] = {}
         self.by_object_asked: dict[tuple[int, int], frozenset[str]] = {}
-        self.extent = 1.0
 
     def visit(self, index: int, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Sort one entry of the depsgraph's list into a group or into the lights."""
@@ -188,15 +189,13 @@ class _Surveyor:
         """The group of an object's mesh; objects that look alike share one."""
         self._warn_once(item)
         materials = self._materials(item)
-        corners = np.abs(np.array(item.bound_box, np.float64))
-        self.extent = max(self.extent, float(corners[np.isfinite(corners)].max(initial=0.0)))
         visible = _camera_visible(item, self.view_layer)
         if parent is not None:
             visible = visible and _camera_visible(parent, self.view_layer)
         traits = ObjectTraits(item.name, materials, visible, item.pass_index, info)
         pointers = tuple(material.as_pointer() if material else 0 for material in materials)
         key = (item.data.as_pointer(), pointers, visible, item.pass_index, info)
-        return self.groups.setdefault(key, Group(traits, item.data))
+        return self.groups.setdefault(key, Group(traits, item.data, np.array(item.bound_box)))
 
 
 def survey(
@@ -214,4 +213,21 @@ def survey(
         if index % _STOP_INTERVAL == 0 and stop():
             return None
         surveyor.visit(index, instance)
-    return Survey(list(surveyor.groups.values()), surveyor.lights, matrices, surveyor.extent)
+    groups = list(surveyor.groups.values())
+    extent = _farthest([group.corners for group in groups])
+    return Survey(groups, surveyor.lights, matrices, extent, _reach(groups, matrices))
+
+
+def _reach(groups: list[Group], matrices: np.ndarray) -> float:
+    """How far instances reach from the scene's origin along an axis."""
+    places = []
+    for group in groups:
+        own = matrices[group.members]
+        places.append(own[:, None, :3, :3] @ group.corners[..., None] + own[:, None, :3, 3:])
+    return _farthest(places)
+
+
+def _farthest(points: list[np.ndarray]) -> float:
+    """The largest of all finite coordinates, without sign; one at least."""
+    coordinates = np.abs(np.concatenate([[0.0], *(place.ravel() for place in points)]))
+    return max(1.0, float(coordinates[np.isfinite(coordinates)].max()))

@@ -122,8 +122,7 @@ def coordinates(
             step, entry = _vector_math(node, stack, evaluate)
             matrix = matrix @ step
         else:
-            space, uv = origin(source, world)
-            return Coordinates(space, uv, matrix)
+            return origin(source, world).by(matrix)
 
 
 def _has_constant(source: Source, own: bpy.types.NodeSocket) -> bool:
@@ -145,22 +144,36 @@ def _everywhere(point: np.ndarray) -> np.ndarray:
     return result
 
 
-def origin(source: Source, world: bool) -> tuple[str, str]:
-    """What a node provides at the start of a chain: a space, and the name of a UV map."""
+# What the outputs of Geometry and of Texture Coordinate are.
+_OF_GEOMETRY = {"Position": "position", "Normal": "normal", "True Normal": "face normal"}
+_OF_TEXTURES = {
+    "UV": "uv",
+    "Generated": "generated",
+    "Object": "object",
+    "Normal": "own normal",
+}
+
+
+def origin(source: Source, world: bool) -> Coordinates:
+    """What a node provides at the start of a chain."""
     node, name = source.node, source.output.identifier
-    kind = node.bl_idname
+    kind, space, uv = node.bl_idname, None, ""
+    matrix = np.eye(4)
     if world:
         if kind == "ShaderNodeTexCoord" and (
             name == "Generated" or (name == "Object" and node.object is None)
         ):
-            return "environment", ""
+            space = "environment"
     elif kind == "ShaderNodeUVMap" and not node.from_instancer:
-        return "uv", node.uv_map
+        space, uv = "uv", node.uv_map
     elif kind == "ShaderNodeTexCoord" and not node.from_instancer:
-        if name == "UV":
-            return "uv", ""
-        if name == "Generated" or (name == "Object" and node.object is None):
-            return name.lower(), ""
+        space = _OF_TEXTURES.get(name)
+        if name == "Object" and node.object is not None:
+            space, matrix = "position", np.array(node.object.matrix_world.inverted_safe())
+    elif kind == "ShaderNodeNewGeometry":
+        space = _OF_GEOMETRY.get(name)
     elif kind == "ShaderNodeAttribute" and name == "Vector" and node.attribute_type == "GEOMETRY":
-        return "uv", node.attribute_name
+        space, uv = "uv", node.attribute_name
+    if space is not None:
+        return Coordinates(space, uv, matrix)
     raise UnsupportedError(f"coordinates from the output '{source.output.name}' of '{node.name}'")

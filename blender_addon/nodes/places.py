@@ -8,9 +8,12 @@ import bpy
 import numpy as np
 
 from .coordinates import coordinates, mapping, origin
+from .operators import VECTOR_TO_FLOAT
 from .tree import Source, Stack, resolve
 from .values import (
     FAR,
+    NORMALS,
+    Composed,
     Constant,
     Coordinates,
     PatternValue,
@@ -30,11 +33,10 @@ _MOST_LOOKUPS = 60
 
 
 def given(ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
-    """Texture Coordinate and UV Map."""
+    """Texture Coordinate, UV Map and Geometry."""
     if ev.world:
         raise UnsupportedError(f"the output '{output.name}'")
-    space, uv = origin(Source(stack, node=node, output=output), world=False)
-    return as_value(ev, Coordinates(space, uv, np.eye(4)))
+    return as_value(ev, origin(Source(stack, node=node, output=output), world=False))
 
 
 def mapped(
@@ -61,7 +63,23 @@ def as_value(ev: Evaluator, place: Coordinates | Value) -> Value:
     """Coordinates as numbers."""
     if not isinstance(place, Coordinates):
         return place
-    return PlaceValue(place, ev.textures.extent if place.space == "object" else FAR)
+    extents = {"object": ev.textures.extent, "position": ev.textures.reach}
+    extents |= dict.fromkeys(NORMALS, 1.0)
+    return PlaceValue(place, extents.get(place.space, FAR))
+
+
+def dot(ev: Evaluator, node: bpy.types.Node, a: Value, b: Value) -> Value:
+    """The dot product of two vectors."""
+    if isinstance(a, Constant):
+        a, b = b, a
+    if isinstance(b, Constant) and isinstance(a, PlaceValue) and a.channel == "rgb":
+        row = [*b.rgb, 0.0]
+        return component(turned(ev, node, a, np.array([row, row, row, [0.0, 0.0, 0.0, 1.0]])), 0)
+    if any(isinstance(vector, PlaceValue | PatternValue | Composed) for vector in (a, b)):
+        pairs = [(component(a, index), component(b, index)) for index in range(3)]
+        products = [ev.combine(node, "float", lambda x, y: x * y, *pair) for pair in pairs]
+        return ev.combine(node, "float", lambda x, y, z: x + y + z, *products)
+    return ev.combine(node, "float", VECTOR_TO_FLOAT["DOT_PRODUCT"], a, b)
 
 
 def length(vector: Value) -> Value:
@@ -82,7 +100,8 @@ def looked_up(
     """
     entry = node.inputs["Vector"]
     try:
-        return coordinates(entry, stack, ev.value, world=ev.world, default=default)
+        place = coordinates(entry, stack, ev.value, world=ev.world, default=default)
+        return as_value(ev, place) if place.is_geometry else place
     except UnsupportedError as reason:
         if ev.world or not _is_computed(resolve(entry, stack)):
             raise

@@ -75,8 +75,8 @@ class TextureStore:
         self._sources: dict[tuple[int, bool], BlenderSource] = {}
         self._images: dict[int, tuple[ImageSource, int]] = {}
         self._textures: dict[str, int] = {}
-        #: How far meshes reach from their origins.
-        self.extent = 1.0
+        #: How far meshes reach from their origins, and from that of the scene.
+        self.extent = self.reach = 1.0
         # Attributes of meshes that are read as UV maps, and what is read of others, by the names
         # that the scene knows it by.
         self.uvs: set[str] = set()
@@ -146,7 +146,10 @@ class TextureStore:
         Attributes, places and patterns are never scaled.
         """
         data: dict[str, Any]
-        if isinstance(value, PlaceValue):
+        if isinstance(value, PlaceValue) and value.place.is_geometry:
+            name = value.place.space
+            data = _geometry(value.place)
+        elif isinstance(value, PlaceValue):
             name = self.solid(value.place)
             data = {"type": "attribute", "name": name, "default": [0.0, 0.0, 0.0, 1.0]}
         elif isinstance(value, PatternValue):
@@ -183,6 +186,7 @@ class TextureStore:
             return data | {"type": "noise", "colored": sampling.space == "colored noise"}
         if sampling.at:
             data["at"] = self.json(sampling.at, "vector")
+            data["projection"] = sampling.projection
         elif sampling.uv:
             self.uvs.add(sampling.uv)
         return data | {
@@ -224,3 +228,11 @@ class TextureStore:
         if isinstance(value, Constant):
             return value.rgb[0] if kind == "float" else list(value.rgb)
         return {"texture": self.texture(value), "channel": value.channel}
+
+
+def _geometry(place: Coordinates) -> dict[str, Any]:
+    """The ABI's texture of what the geometry has."""
+    of = {"own normal": "normal", "face normal": "face_normal"}.get(place.space, place.space)
+    rows = [float(number) for number in place.matrix[:3].ravel()]
+    space = "object" if place.space == "own normal" else "world"
+    return {"type": "geometry", "of": of, "space": space, "transform": rows}

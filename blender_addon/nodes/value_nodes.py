@@ -13,7 +13,7 @@ from .arithmetic import pick
 from .coordinates import AS_IT_IS, equirectangular
 from .curves import float_curve, rgb_curves
 from .patterns import bricks, checker, gradient, noise, voronoi, wave
-from .places import given, length, looked_up, mapped
+from .places import as_value, dot, given, length, looked_up, mapped
 from .tree import Stack, is_linked
 from .values import (
     KINDS,
@@ -85,8 +85,8 @@ def _image(
     if node.image is None:
         ev.warn(node, "a node without an image", "magenta is used")
         return Constant.number(1.0) if alpha else Constant.color((1.0, 0.0, 1.0))
-    if node.projection not in {"FLAT", "EQUIRECTANGULAR"}:
-        raise UnsupportedError(f"the {node.projection.lower().replace('_', ' ')} projection")
+    if node.projection == "MIRROR_BALL":
+        raise UnsupportedError("the mirror ball projection")
     place = looked_up(ev, node, stack, "uv")
     if environment != (isinstance(place, Coordinates) and place.space == "environment"):
         raise UnsupportedError("a texture of this kind in this place")
@@ -97,16 +97,27 @@ def _image(
     source = ev.textures.source(node.image, straight_alpha=straight)
     if not environment:
         wrap = _WRAP[node.extension]
+        if node.projection != "FLAT":
+            place = as_value(ev, place)
         if isinstance(place, Coordinates):
             uv, transform = ev.textures.place(place)
             sampling = Sampling("uv", transform, uv, wrap, texture_filter)
         else:
-            sampling = Sampling("uv", AS_IT_IS, "", wrap, texture_filter, at=place)
+            sampling = Sampling(
+                "uv", AS_IT_IS, "", wrap, texture_filter, place, projection=_projection(node)
+            )
     elif place.point() is not None:
         return pick(source, *equirectangular(place.point()), texture_filter)
     else:
         sampling = Sampling("environment", place.direction_matrix(), filter=texture_filter)
     return ImageValue(source, sampling, "float" if alpha else "color", "a" if alpha else "rgb")
+
+
+def _projection(node: bpy.types.Node) -> str | dict[str, dict[str, float]]:
+    """How the ABI calls an Image Texture's."""
+    if node.projection == "BOX":
+        return {"box": {"blend": node.projection_blend}}
+    return node.projection.lower()
 
 
 def _attribute(
@@ -160,6 +171,8 @@ def _vector_math(
             vector = ev.combine(node, "vector", subtract, *values[:2], Constant.number(0.0))
         if not isinstance(vector, ImageValue | AttributeValue):
             return length(vector)
+    if operation == "DOT_PRODUCT":
+        return dot(ev, node, *values[:2])
     if operation in operators.VECTOR_TO_FLOAT:
         return ev.combine(node, "float", operators.VECTOR_TO_FLOAT[operation], *values)
     if operation in operators.VECTOR:

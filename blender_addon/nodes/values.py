@@ -74,16 +74,26 @@ def scaling(factor: float) -> np.ndarray:
     return np.diag([factor, factor, factor, 1.0])
 
 
+#: Spaces of unit vectors.
+NORMALS = ("normal", "face normal", "own normal")
+
+
 @dataclass(frozen=True)
 class Coordinates:
     """`matrix` (4x4) times a UV map, times where a point of the mesh is, or times a direction.
 
-    `space`: "uv"; "generated" or "object" (see `export.mesh.Projection`); "environment".
+    `space`: "uv"; "generated" or "object" (see `export.mesh.Projection`); "position", "normal" and
+    "face normal" in the scene, and "own normal" in the space of the mesh; "environment".
     """
 
     space: str
     uv: str
     matrix: np.ndarray
+
+    @property
+    def is_geometry(self) -> bool:
+        """Whether the engine takes them from the geometry, and not from attributes."""
+        return self.space == "position" or self.space in NORMALS
 
     def by(self, matrix: np.ndarray) -> Coordinates:
         """A 4x4 matrix times these."""
@@ -120,7 +130,7 @@ class Sampling:
     `matrix`: for "uv" the six numbers of the ABI's texture transform, for "environment" the nine of
     a 3x3 matrix applied to the direction, for noise what its strength depends on; then `uv` is the
     attribute that says where, and each component of "colored noise" has its own. `at`: what stands
-    for the UV map or the attribute instead.
+    for the UV map or the attribute instead. `projection`: the ABI's, of what is `at`.
     """
 
     space: Literal["uv", "environment", "noise", "colored noise"]
@@ -129,6 +139,7 @@ class Sampling:
     wrap: str = "repeat"
     filter: str = "linear"
     at: Value | None = None
+    projection: Any = "flat"
 
 
 @dataclass(frozen=True, eq=False)

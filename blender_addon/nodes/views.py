@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
+from .places import given
 from .tree import Stack, is_linked
 from .values import PatternValue, UnsupportedError, Value
 
@@ -35,9 +36,9 @@ def layer_weight(
 def geometry(
     ev: Evaluator, node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack
 ) -> Value:
-    """Geometry: the side that is seen."""
+    """Geometry: the side that is seen, places and normals."""
     if output.identifier != "Backfacing":
-        raise UnsupportedError(f"the output '{output.name}'")
+        return given(ev, node, output, stack)
     return ev.combine(node, "float", lambda facing: (facing < 0.0) * 1.0, _facing(ev, node, output))
 
 

@@ -204,7 +204,7 @@ impl SceneBuilder {
         Ok(Scene {
             meshes: self.meshes.clone(),
             images: self.images.clone(),
-            textures: self.textures.clone(),
+            textures: self.textures.iter().map(|t| t.clone().relative_to(origin)).collect(),
             materials,
             lights,
             camera,

@@ -11,6 +11,7 @@ pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod needs;
+pub mod picture;
 pub mod relief;
 pub mod texture;
 mod triangulate;

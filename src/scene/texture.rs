@@ -1,61 +1,15 @@
 //! Textures: where a material's values come from when they are not constant.
 
 use super::composition::{self, Multilinear, MultilinearJson, Table, TableJson};
+use super::picture::{ImageTexture, Projection, Reconstruction, Wrap};
 use super::value::Value;
 use super::{Image, SceneError};
 use crate::math::bricks::Bricks;
 use crate::math::cells::Cells;
 use crate::math::noise::Fractal;
-use glam::{Affine2, Mat2, Vec2, Vec4};
+use glam::{Affine2, DAffine3, DMat3, DVec3, Mat2, Vec2, Vec4};
 use serde::Deserialize;
 use std::sync::Arc;
-
-/// What lies outside `[0,1]` of an image's coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum Wrap {
-    /// The picture again.
-    #[default]
-    Repeat,
-    /// The edge's texel.
-    Clamp,
-    /// The picture mirrored.
-    Mirror,
-    /// Transparent black.
-    Black,
-}
-
-/// How an image is reconstructed between texel centres.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum Reconstruction {
-    /// Bilinear.
-    #[default]
-    Linear,
-    /// Nearest texel.
-    Closest,
-}
-
-/// An image mapped by a UV set.
-#[derive(Clone, Debug)]
-pub struct ImageTexture {
-    /// Index of the image in the scene.
-    pub image: u32,
-    /// Name of the UV attribute; empty is the mesh's first one.
-    pub uv: String,
-    /// What stands for its coordinates instead, the first two components of it.
-    pub at: Option<Value>,
-    /// UV to picture coordinates, (0,0) at the bottom left.
-    pub transform: Affine2,
-    /// Wrap along s and t.
-    pub wrap: [Wrap; 2],
-    /// Reconstruction filter.
-    pub filter: Reconstruction,
-    /// Factor of the decoded value.
-    pub scale: Vec4,
-    /// Added after the factor.
-    pub bias: Vec4,
-}
 
 /// Where noise and other patterns are looked up.
 #[derive(Clone, Debug, Deserialize)]
@@ -127,6 +81,40 @@ pub struct BrickTexture {
     pub bricks: Bricks,
 }
 
+/// What the geometry of a surface has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Where the point is.
+    Position,
+    /// The unit shading normal of the mesh, on the side that is seen.
+    Normal,
+    /// The unit normal of the triangle, on the side that is seen.
+    FaceNormal,
+}
+
+/// The space that it is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Space {
+    /// The scene's.
+    #[default]
+    World,
+    /// The mesh's own.
+    Object,
+}
+
+/// The geometry of the surface as a vector.
+#[derive(Clone, Debug)]
+pub struct GeometryTexture {
+    /// What it is.
+    pub of: Quantity,
+    /// The space that it is in.
+    pub space: Space,
+    /// What is applied to it, in a space around the scene's origin.
+    pub to: DAffine3,
+}
+
 /// A texture: a function of the surface point with an RGBA value.
 #[derive(Clone, Debug)]
 pub enum Texture {
@@ -142,6 +130,8 @@ pub enum Texture {
     Bricks(Box<BrickTexture>),
     /// The length of a vector.
     Length(Value),
+    /// The geometry of the surface.
+    Geometry(Box<GeometryTexture>),
     /// A colour attribute of the mesh, or `default` where the mesh has none of that name.
     Attribute {
         /// Name of the attribute.
@@ -169,6 +159,8 @@ enum Json {
         uv: String,
         #[serde(default)]
         at: Option<Value>,
+        #[serde(default)]
+        projection: Projection,
         #[serde(default = "identity")]
         transform: [f32; 6],
         #[serde(default)]
@@ -205,6 +197,13 @@ enum Json {
     Length {
         of: Value,
     },
+    Geometry {
+        of: Quantity,
+        #[serde(default)]
+        space: Space,
+        #[serde(default = "identity_in_space")]
+        transform: [f64; 12],
+    },
     Attribute {
         name: String,
         default: [f32; 4],
@@ -229,11 +228,26 @@ fn identity() -> [f32; 6] {
     [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 }
 
+fn identity_in_space() -> [f64; 12] {
+    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+}
+
 fn ones() -> [f32; 4] {
     [1.0; 4]
 }
 
 impl Texture {
+    /// The same where the coordinates of the scene are relative to `origin`.
+    pub(super) fn relative_to(self, origin: DVec3) -> Self {
+        match self {
+            Self::Geometry(mut t) if t.of == Quantity::Position && t.space == Space::World => {
+                t.to.translation = t.to.transform_point3(origin);
+                Self::Geometry(t)
+            }
+            other => other,
+        }
+    }
+
     /// Where it is looked up, if it is a pattern.
     pub fn place(&self) -> Option<&Place> {
         match self {
@@ -243,6 +257,7 @@ impl Texture {
             Self::Constant(_)
             | Self::Image(_)
             | Self::Length(_)
+            | Self::Geometry(_)
             | Self::Attribute { .. }
             | Self::Facing
             | Self::Multilinear(_)
@@ -296,8 +311,14 @@ impl Texture {
                 finite("value", &value)?;
                 Ok(Self::Constant(value.into()))
             }
-            Json::Image { image, uv, at, transform, wrap_s, wrap_t, filter, scale, bias } => {
+            Json::Image { image, uv, at, projection, transform, wrap_s, wrap_t, filter, scale, bias } => {
                 exists(image)?;
+                if projection != Projection::Flat && at.is_none() {
+                    return Err(fail("a projection needs three coordinates: `at` is missing".into()));
+                }
+                if let Projection::Box { blend } = projection {
+                    finite("blend", &[blend])?;
+                }
                 finite("transform", &transform)?;
                 finite("scale", &scale)?;
                 finite("bias", &bias)?;
@@ -309,6 +330,7 @@ impl Texture {
                     image,
                     uv,
                     at,
+                    projection: projection.sane(),
                     transform: Affine2::from_mat2_translation(
                         Mat2::from_cols(Vec2::new(a, d), Vec2::new(b, e)),
                         Vec2::new(c, f),
@@ -355,6 +377,13 @@ impl Texture {
                 composition::check(std::slice::from_ref(&of), name, before)?;
                 Ok(Self::Length(of))
             }
+            Json::Geometry { of, space, transform } => {
+                finite("transform", &transform.map(|v| v as f32))?;
+                let [a, b, c, d, e, f, g, h, i, j, k, l] = transform;
+                let matrix3 = DMat3::from_cols_array(&[a, e, i, b, f, j, c, g, k]);
+                let to = DAffine3 { matrix3, translation: DVec3::new(d, h, l) };
+                Ok(Self::Geometry(Box::new(GeometryTexture { of, space, to })))
+            }
             Json::Attribute { name: attribute, default } => {
                 finite("default", &default)?;
                 Ok(Self::Attribute { name: attribute, default: default.into() })
@@ -390,6 +419,9 @@ mod tests {
             (r#"{"type":"image","image":1}"#, "no image 1"),
             (r#"{"type":"image","image":0,"wrap":"x"}"#, "wrap"),
             (r#"{"type":"voronoi"}"#, "voronoi"),
+            (r#"{"type":"image","image":0,"projection":"tube"}"#, "`at`"),
+            (r#"{"type":"geometry","of":"colour"}"#, "colour"),
+            (r#"{"type":"geometry","of":"normal","transform":[1]}"#, "length"),
             (r#"{"type":"noise","image":0}"#, "place"),
             (r#"{"type":"noise","place":"","image":0}"#, "place"),
             (r#"{"type":"noise","place":"p","image":1}"#, "no image 1"),

@@ -121,6 +121,7 @@ mod tests {
     use crate::scene::mesh::{AttributeInput, Interpolation, MeshInput};
     use crate::scene::value::Channel;
     use crate::scene::{Image, SceneBuilder, Warnings};
+    use crate::shading::texture::Looks;
     use glam::Vec2;
     use std::sync::Arc;
 
@@ -157,7 +158,7 @@ mod tests {
         let texture = b.add_texture("made", json).unwrap();
         let textures = TextureSet::new(Arc::new(b.build().unwrap()));
         move |u, v| {
-            let at = MeshPoint::new(0, 0, Vec2::new(u, v));
+            let at = MeshPoint::new(0, 0, 0, Vec2::new(u, v));
             let value = Value::Texture { texture, channel: Channel::Rgb };
             (textures.color(&value, &at), textures.color_slopes(&value, &at))
         }
@@ -280,9 +281,10 @@ mod tests {
         b.add_texture("made", json).unwrap();
         let textures = TextureSet::new(Arc::new(b.build().unwrap()));
         let value = |texture| Value::Texture { texture, channel: Channel::R };
-        assert_eq!([0, 1, 2].map(|t| textures.looks(&value(t))), [false, true, true]);
-        assert!(!textures.looks(&Value::number(1.0)));
-        let at = MeshPoint::new(0, 0, Vec2::splat(0.3));
+        let looks = [Looks::Same, Looks::Direction, Looks::Direction];
+        assert_eq!([0, 1, 2].map(|t| textures.looks(&value(t))), looks);
+        assert_eq!(textures.looks(&Value::number(1.0)), Looks::Same);
+        let at = MeshPoint::new(0, 0, 0, Vec2::splat(0.3));
         assert_eq!(textures.number(&value(2), &at), 3.0);
         assert_eq!(textures.number(&value(2), &MeshPoint { facing: -0.25, ..at }), 0.5);
         assert_eq!(textures.slopes(&value(2), &at), Vec2::ZERO);

@@ -19,11 +19,11 @@ pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene
     let moves = |group: &InstanceGroup| {
         group.materials.iter().any(|&m| scene.materials[m as usize].displacement.is_some())
     };
-    // where the first of each group stands; there may be none
-    let mut stands: BTreeMap<u32, Mat3> = BTreeMap::new();
-    for instance in &scene.instances {
+    // the first instance of each group; there may be none
+    let mut stands: BTreeMap<u32, u32> = BTreeMap::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
         if moves(&scene.groups[instance.group as usize]) {
-            stands.entry(instance.group).or_insert_with(|| Mat3::from(instance.to_world.matrix3));
+            stands.entry(instance.group).or_insert(i as u32);
         }
     }
     if stands.is_empty() {
@@ -38,9 +38,9 @@ pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene
     // by mesh and by what displaces it: colours may differ
     let mut made: BTreeMap<(u32, Vec<String>), u32> = BTreeMap::new();
     for (k, group) in scene.groups.iter().enumerate() {
-        let Some(&to_world) = stands.get(&(k as u32)) else { continue };
+        let Some(&instance) = stands.get(&(k as u32)) else { continue };
         let mesh = *made.entry((group.mesh, displacements(group))).or_insert_with(|| {
-            let (mesh, bad) = displace(&scene, &textures, group, to_world);
+            let (mesh, bad) = displace(&scene, &textures, group, instance);
             if bad > 0 {
                 let what = "vertices with a displacement that is not finite stay where they are";
                 warnings.add(format!("mesh {:?}", mesh.name), what, bad);
@@ -54,10 +54,11 @@ pub(super) fn displaced(scene: Arc<Scene>, warnings: &mut Warnings) -> Arc<Scene
 }
 
 /// The mesh of a group as its materials displace it, and how many vertices have no finite place.
-fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, to_world: Mat3) -> (Mesh, u64) {
+fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, instance: u32) -> (Mesh, u64) {
     let mesh = &scene.meshes[group.mesh as usize];
     let given: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| corner_normals(mesh, t)).collect();
     let normals = vertex_normals(mesh, &given);
+    let to_world = Mat3::from(scene.instances[instance as usize].to_world.matrix3);
     let (of_normals, from_world) = (normal_matrix(to_world), to_world.inverse());
     let displacement = |triangle: usize| {
         let slot = mesh.slots.as_ref().map_or(0, |s| s[triangle] as usize);
@@ -73,7 +74,7 @@ fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, to_worl
             if std::mem::replace(&mut is_placed[v as usize], true) {
                 continue;
             }
-            let at = MeshPoint::new(group.mesh, t as u32, barycentrics);
+            let at = MeshPoint::new(instance, group.mesh, t as u32, barycentrics);
             let height = textures.number(height, &at);
             let normal = normals[v as usize];
             let moved = match space {

@@ -45,7 +45,7 @@ pub(super) fn emissive_triangles(
             if !emits[material as usize] {
                 continue;
             }
-            let at = |barycentrics| MeshPoint::new(group.mesh, t, barycentrics);
+            let at = |barycentrics| MeshPoint::new(i as u32, group.mesh, t, barycentrics);
             let sum: Vec3 = EMISSION_POINTS
                 .into_iter()
                 .map(|(b, facing)| {

@@ -51,7 +51,7 @@ impl World {
         let [a, b, c] = mesh.triangles[hit.triangle as usize].map(|v| mesh.positions[v as usize]);
         let outside = (matrix * (b - a)).cross(matrix * (c - a)) * 1f32.copysign(matrix.determinant());
         let normal = normalize_any(outside);
-        let at = MeshPoint::new(index, hit.triangle, Vec2::new(hit.u, hit.v));
+        let at = MeshPoint::new(hit.instance, index, hit.triangle, Vec2::new(hit.u, hit.v));
         Layer {
             depth: hit.t,
             position,

@@ -50,7 +50,7 @@ impl World {
         if let (Some(b), Some((instance, triangle))) = (s.barycentrics, self.emitters.triangle_of(id)) {
             let mesh = self.scene.group(instance).mesh;
             let barycentrics = if self.scene.is_mirrored(instance) { b.yx() } else { b };
-            let at = MeshPoint::new(mesh, triangle, barycentrics);
+            let at = MeshPoint::new(instance, mesh, triangle, barycentrics);
             let origin = place(&self.scene, &self.accel, instance, &at);
             (ray, point) = (origin.spawn(s.direction), origin.position);
             if let Emission::Extended { radiance, .. } = &mut emission {

@@ -5,7 +5,7 @@ use super::class::SurfaceClass;
 use super::lobes::fresnel::f0_from_ior;
 use super::lobes::{Dielectric, Fresnel, Ggx, Lambert, Lobe, OrenNayar, Reflection, Sheen, Translucent};
 use super::surface::{SurfacePoint, normalize_any};
-use super::texture::{MeshPoint, TextureSet};
+use super::texture::{Looks, MeshPoint, TextureSet};
 use crate::math::Frame;
 use crate::scene::material::{Closure, MetalEdge, PrincipledClosure};
 use crate::scene::needs::may_be_transparent;
@@ -22,8 +22,8 @@ pub struct Materials {
     pub(super) textures: TextureSet,
     /// For each material, whether light may pass straight through.
     transparent: Vec<bool>,
-    /// For each material, whether it depends on the direction that it is seen from by its textures.
-    looks: Vec<bool>,
+    /// For each material, what it depends on by its textures of how it is seen.
+    looks: Vec<Looks>,
     /// For each material, what [`Materials::has_views`] says.
     views: Vec<bool>,
 }
@@ -41,8 +41,13 @@ impl Materials {
         }
         let transparent: Vec<bool> = scene.materials.iter().map(|m| may_be_transparent(m, &scene)).collect();
         let textures = TextureSet::new(scene.clone());
-        let looks: Vec<bool> = scene.materials.iter().map(|m| looks_at_all(m, &textures)).collect();
-        let views = scene.materials.iter().zip(&looks).map(|(m, looks)| *looks || is_layered(m)).collect();
+        let looks: Vec<Looks> = scene.materials.iter().map(|m| most_looks(m, &textures)).collect();
+        let views = scene
+            .materials
+            .iter()
+            .zip(&looks)
+            .map(|(m, looks)| *looks != Looks::Same || is_layered(m))
+            .collect();
         Self { textures, transparent, looks, views, scene }
     }
 
@@ -56,7 +61,11 @@ impl Materials {
     pub fn class(&self, material: u32) -> SurfaceClass {
         let class = SurfaceClass::of(&self.scene.materials[material as usize]);
         // what is shared there is known for one direction only
-        if self.looks[material as usize] { class.max(SurfaceClass::Reflecting) } else { class }
+        match self.looks[material as usize] {
+            Looks::Direction => class.max(SurfaceClass::Reflecting),
+            // neighbours show the same side
+            Looks::Same | Looks::Side => class,
+        }
     }
 
     /// Whether light may pass straight through a material somewhere.
@@ -76,8 +85,8 @@ impl Materials {
         let opacity = self.opacity(p.material, &p.at);
         let surface = &self.scene.materials[p.material as usize].surface;
         let through = match self.looks[p.material as usize] {
-            true => self.straight(surface, &p.seen_from(normalize_any(wo)).at),
-            false => self.straight(surface, &p.at),
+            Looks::Same => self.straight(surface, &p.at),
+            Looks::Side | Looks::Direction => self.straight(surface, &p.seen_from(normalize_any(wo)).at),
         };
         (Vec3::splat(1.0 - opacity) + opacity * through).clamp(Vec3::ZERO, Vec3::ONE)
     }
@@ -99,7 +108,7 @@ impl Materials {
     /// [`super::surface::facing`]; few materials ask.
     pub fn emission(&self, material: u32, at: &MeshPoint, facing: impl Fn() -> f32) -> Vec3 {
         let mut at = *at;
-        if self.looks[material as usize] {
+        if self.looks[material as usize] != Looks::Same {
             at.facing = facing();
         }
         let e = self.emitted(&self.scene.materials[material as usize].surface, &at, &facing);
@@ -136,8 +145,8 @@ impl Materials {
         let mut builder = BsdfBuilder::new(p.place.normal, wo);
         let surface = &self.scene.materials[p.material as usize].surface;
         match self.looks[p.material as usize] {
-            true => self.push(&mut builder, surface, Vec3::ONE, &p.seen_from(wo)),
-            false => self.push(&mut builder, surface, Vec3::ONE, p),
+            Looks::Same => self.push(&mut builder, surface, Vec3::ONE, p),
+            Looks::Side | Looks::Direction => self.push(&mut builder, surface, Vec3::ONE, &p.seen_from(wo)),
         }
         builder.build()
     }
@@ -269,11 +278,11 @@ impl Materials {
     }
 }
 
-/// Whether a material depends on the direction that it is seen from by its textures.
-fn looks_at_all(m: &Material, textures: &TextureSet) -> bool {
-    let mut looks = false;
-    m.for_each_value(&mut |v| looks |= textures.looks(v));
-    looks
+/// What a material depends on by its textures of how it is seen.
+fn most_looks(m: &Material, textures: &TextureSet) -> Looks {
+    let mut most = Looks::Same;
+    m.for_each_value(&mut |v| most = most.max(textures.looks(v)));
+    most
 }
 
 /// Whether sheen or a coat may lie over the rest.

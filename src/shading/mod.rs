@@ -9,6 +9,7 @@ mod composition;
 mod displacement;
 mod emissive;
 mod first_hit;
+mod geometry_lookup;
 mod image_lookup;
 mod interior;
 mod layers;

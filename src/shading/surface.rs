@@ -81,7 +81,7 @@ impl SurfacePoint {
     /// The surface where a ray hit.
     pub fn new(scene: &Scene, accel: &Accel, hit: &Hit) -> Self {
         let group = scene.group(hit.instance);
-        let at = MeshPoint::new(group.mesh, hit.triangle, Vec2::new(hit.u, hit.v));
+        let at = MeshPoint::new(hit.instance, group.mesh, hit.triangle, Vec2::new(hit.u, hit.v));
         let place = place(scene, accel, hit.instance, &at);
         Self {
             place,

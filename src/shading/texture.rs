@@ -1,9 +1,11 @@
 //! Texture lookup at a surface point.
 
-use super::image_lookup::sample;
+use super::geometry_lookup::{geometry, own_normal};
+use super::image_lookup::{projected, sample};
 use crate::math::luminance;
 use crate::scene::mesh::Attribute;
-use crate::scene::texture::{BrickTexture, CellTexture, ImageTexture, NoiseTexture, Place, Texture};
+use crate::scene::picture::{ImageTexture, Projection};
+use crate::scene::texture::{BrickTexture, CellTexture, NoiseTexture, Place, Quantity, Texture};
 use crate::scene::value::{Channel, Value};
 use crate::scene::{Mesh, Scene};
 use glam::{Vec2, Vec3, Vec4};
@@ -13,6 +15,8 @@ use std::sync::Arc;
 /// Where on a mesh a texture is looked up.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshPoint {
+    /// Instance of it.
+    pub instance: u32,
     /// Index of the mesh.
     pub mesh: u32,
     /// Triangle of the mesh.
@@ -25,14 +29,25 @@ pub struct MeshPoint {
 
 impl MeshPoint {
     /// A point, looked at straight on.
-    pub fn new(mesh: u32, triangle: u32, barycentrics: Vec2) -> Self {
-        Self { mesh, triangle, barycentrics, facing: 1.0 }
+    pub fn new(instance: u32, mesh: u32, triangle: u32, barycentrics: Vec2) -> Self {
+        Self { instance, mesh, triangle, barycentrics, facing: 1.0 }
     }
 
     /// Another point of the triangle.
     fn moved(&self, u: f32, v: f32) -> Self {
         Self { barycentrics: Vec2::new(u, v), ..*self }
     }
+}
+
+/// What a value depends on, of how the surface is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Looks {
+    /// Nothing.
+    Same,
+    /// The side that is seen.
+    Side,
+    /// The direction that it is seen from.
+    Direction,
 }
 
 /// All textures of a scene, with the names of attributes resolved to numbers.
@@ -44,8 +59,8 @@ pub struct TextureSet {
     /// For each mesh, name numbers of its UV sets and of its colours.
     uv_names: Vec<Box<[u32]>>,
     color_names: Vec<Box<[u32]>>,
-    /// For each texture, whether it depends on where the surface is seen from.
-    looks: Vec<bool>,
+    /// For each texture, what it depends on of how the surface is seen.
+    looks: Vec<Looks>,
 }
 
 /// Share of the finest length of patterns over which they are taken for straight.
@@ -67,17 +82,18 @@ impl TextureSet {
         let uv_names = scene.meshes.iter().map(|m| m.uvs.iter().map(|(n, _)| number(n)).collect()).collect();
         let color_names =
             scene.meshes.iter().map(|m| m.colors.iter().map(|(n, _)| number(n)).collect()).collect();
-        let mut looks: Vec<bool> = Vec::with_capacity(scene.textures.len());
+        let mut looks: Vec<Looks> = Vec::with_capacity(scene.textures.len());
         for t in &scene.textures {
             // what others are made of comes before them
-            looks.push(matches!(t, Texture::Facing) || t.made_of().iter().any(|v| is_one(&looks, v)));
+            let made_of = t.made_of().iter().map(|v| looks_of(&looks, v));
+            looks.push(made_of.fold(own_looks(t), Looks::max));
         }
         Self { texture_names, uv_names, color_names, looks, scene }
     }
 
-    /// Whether a value depends on where the surface is seen from.
-    pub fn looks(&self, value: &Value) -> bool {
-        is_one(&self.looks, value)
+    /// What a value depends on of how the surface is seen.
+    pub fn looks(&self, value: &Value) -> Looks {
+        looks_of(&self.looks, value)
     }
 
     /// The RGBA value of a texture. An image on a mesh without the UV set reads it at (0,0).
@@ -85,17 +101,21 @@ impl TextureSet {
         match &self.scene.textures[texture as usize] {
             Texture::Constant(v) => *v,
             Texture::Image(t) => {
-                let uv = match &t.at {
-                    Some(place) => self.color(place, at).truncate(),
-                    None => self.uv(texture, at).unwrap_or(Vec2::ZERO),
-                };
                 let image = &self.scene.images[t.image as usize];
-                sample(image, t, t.transform.transform_point2(uv)) * t.scale + t.bias
+                let value = match &t.at {
+                    Some(place) => projected(image, t, self.color(place, at), || own_normal(&self.scene, at)),
+                    None => {
+                        let uv = self.uv(texture, at).unwrap_or(Vec2::ZERO);
+                        sample(image, t, t.transform.transform_point2(uv))
+                    }
+                };
+                value * t.scale + t.bias
             }
             Texture::Noise(t) => self.noise(t, self.place(texture, &t.place, at)),
             Texture::Cells(t) => cells(t, self.place(texture, &t.place, at)),
             Texture::Bricks(t) => bricks(t, self.place(texture, &t.place, at)),
             Texture::Length(of) => Vec3::splat(self.color(of, at).length()).extend(1.0),
+            Texture::Geometry(t) => geometry(&self.scene, t, at).extend(1.0),
             Texture::Attribute { default, .. } => self.attribute(texture, at).unwrap_or(*default),
             Texture::Facing => Vec3::splat(at.facing).extend(1.0),
             Texture::Multilinear(t) => self.multilinear(t, at).extend(1.0),
@@ -163,6 +183,14 @@ impl TextureSet {
         let Value::Texture { texture, channel } = *value else { return [Vec3::ZERO; 2] };
         let slopes = match &self.scene.textures[texture as usize] {
             Texture::Constant(_) | Texture::Facing => [Vec4::ZERO; 2],
+            Texture::Image(t) if t.projection != Projection::Flat => {
+                let Some(place) = &t.at else { return [Vec3::ZERO; 2] };
+                let image = &self.scene.images[t.image as usize];
+                let step = 1.0 / image.width().max(image.height()) as f32;
+                let normal = own_normal(&self.scene, at);
+                let picture = |p| projected(image, t, p, || normal) * t.scale;
+                slopes_along(self.color(place, at), self.color_slopes(place, at), step, picture)
+            }
             Texture::Image(t) => {
                 let Some((uv, edges)) = self.uv_slopes(texture, t, at) else { return [Vec3::ZERO; 2] };
                 let image = &self.scene.images[t.image as usize];
@@ -195,7 +223,7 @@ impl TextureSet {
                 let direction = self.color(of, at).normalize_or_zero();
                 self.color_slopes(of, at).map(|s| Vec3::splat(direction.dot(s)).extend(0.0))
             }
-            Texture::Attribute { .. } => {
+            Texture::Attribute { .. } | Texture::Geometry(_) => {
                 let corner = |u, v| self.lookup(texture, &at.moved(u, v));
                 let [a, b, c] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)];
                 [b - a, c - a]
@@ -223,15 +251,7 @@ impl TextureSet {
                 [corner(1.0, 0.0), corner(0.0, 1.0)].map(|end| end - corner(0.0, 0.0))
             }
         };
-        edges.map(|edge| {
-            let length = edge.length();
-            let d = edge * (0.5 * step / length);
-            if length > 0.0 {
-                (pattern(middle + d) - pattern(middle - d)) * (length / step)
-            } else {
-                Vec4::ZERO
-            }
-        })
+        slopes_along(middle, edges, step, pattern)
     }
 
     /// The coordinates of an image before its transform, and their slopes along the edges of the triangle.
@@ -275,9 +295,31 @@ pub(super) fn finite(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
 }
 
-/// Whether a value comes from a texture that is marked.
-fn is_one(marked: &[bool], value: &Value) -> bool {
-    matches!(*value, Value::Texture { texture, .. } if marked[texture as usize])
+/// The slopes of a function of a place along edges that leave it, taken over a length of `step`.
+fn slopes_along(middle: Vec3, edges: [Vec3; 2], step: f32, value: impl Fn(Vec3) -> Vec4) -> [Vec4; 2] {
+    edges.map(|edge| {
+        let length = edge.length();
+        let d = edge * (0.5 * step / length);
+        if length > 0.0 { (value(middle + d) - value(middle - d)) * (length / step) } else { Vec4::ZERO }
+    })
+}
+
+/// What a texture depends on by itself.
+fn own_looks(t: &Texture) -> Looks {
+    match t {
+        Texture::Facing => Looks::Direction,
+        Texture::Geometry(t) if t.of != Quantity::Position => Looks::Side,
+        Texture::Image(t) if matches!(t.projection, Projection::Box { .. }) => Looks::Side,
+        _ => Looks::Same,
+    }
+}
+
+/// What a value depends on, of textures that depend on this.
+fn looks_of(textures: &[Looks], value: &Value) -> Looks {
+    match *value {
+        Value::Constant(_) => Looks::Same,
+        Value::Texture { texture, .. } => textures[texture as usize],
+    }
 }
 
 fn part(channel: Channel, v: Vec4) -> Vec3 {

@@ -249,7 +249,7 @@ impl World {
         let mesh = &self.scene.meshes[index as usize];
         if let Some(normals) = &mesh.normals {
             let normal = |u: f32, v: f32| {
-                interpolate(normals, mesh, &MeshPoint::new(index, triangle, Vec2::new(u, v)))
+                interpolate(normals, mesh, &MeshPoint::new(instance, index, triangle, Vec2::new(u, v)))
             };
             if normal(0.0, 0.0) != normal(1.0, 0.0) || normal(0.0, 0.0) != normal(0.0, 1.0) {
                 return None;
@@ -433,7 +433,7 @@ impl World {
                         Some((b, (instance, triangle))) => {
                             let mesh = self.scene.group(instance).mesh;
                             let barycentrics = if self.scene.is_mirrored(instance) { b.yx() } else { b };
-                            let at = MeshPoint::new(mesh, triangle, barycentrics);
+                            let at = MeshPoint::new(instance, mesh, triangle, barycentrics);
                             let place = place(&self.scene, &self.accel, instance, &at);
                             let radiance = self.visible_emission(instance, &at, place.normal, -s.direction);
                             (radiance, Target::Surface(place))

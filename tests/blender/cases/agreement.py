@@ -404,6 +404,51 @@ def case_checkers_and_pictures_by_other_coordinates() -> None:
         _check_floor(space, kind)
 
 
+def case_pictures_around_things() -> None:
+    """From the sides of a box, sharp and blended, around a sphere and a tube; on floor and ball."""
+    # with so many rows no edge is where a flat floor looks its one colour up
+    pixels = np.ones((7, 7, 4), np.float32)
+    pixels[..., :3] = np.random.default_rng(2).random((7, 7, 3))
+    for projection, blend, space in (
+        ("BOX", 0.0, "Object"),
+        ("BOX", 0.6, "Generated"),
+        ("SPHERE", 0.0, "Generated"),
+        ("TUBE", 0.0, "Generated"),
+        ("FLAT", 0.0, "Normal"),
+    ):
+        tree, texture, diffuse = _floor_of("TexImage", space)
+        texture.image, texture.interpolation = builders.image("Patches", pixels), "Closest"
+        texture.projection, texture.projection_blend = projection, blend
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        bpy.data.objects["Ball"].rotation_euler = (0.5, 0.4, 0.3)
+        tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
+        _check_floor(projection, blend, space)
+
+
+def case_masks_by_where_and_how_things_are() -> None:
+    """By height, by what faces up, and by another object's coordinates; on floor and ball."""
+    for kind, output in (
+        ("NewGeometry", "Position"),
+        ("NewGeometry", "Normal"),
+        ("NewGeometry", "True Normal"),
+        ("TexCoord", "Object"),
+        ("TexCoord", "Normal"),
+    ):
+        tree, dot, diffuse = _floor_of("VectorMath", "")
+        dot.operation = "DOT_PRODUCT"
+        dot.inputs[1].default_value = (0.2, 0.3, 0.6)
+        source = tree.nodes.new(f"ShaderNode{kind}")
+        if output == "Object":
+            source.object = builders.link(None, "Helper")
+            source.object.location = (0.3, 0.2, 0.6)
+            source.object.rotation_euler = (0.4, 0.0, 0.5)
+        tree.links.new(source.outputs[output], dot.inputs[0])
+        _through_ramp(tree, dot, diffuse, 0.1, 0.5)
+        bpy.data.objects["Ball"].data.materials[0] = bpy.data.materials["Floor"]
+        bpy.data.objects["Ball"].rotation_euler = (0.5, 0.4, 0.3)
+        _check_floor(kind, output)
+
+
 def case_coloured_noise() -> None:
     """Plain, of another hue, and by coordinates that it bends itself."""
     for use in ("plain", "hue", "bend"):
