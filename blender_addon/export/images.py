@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ..log import ExportLog
+from .image_files import FromFiles, UnreadableError, read_frame, read_tiles, srgb_to_linear
 
 # Colour spaces of byte images that Segue decodes; float images are scene linear already.
 _COLORSPACES = {
@@ -22,10 +23,14 @@ _COLORSPACES = {
 
 @dataclass(frozen=True)
 class Pixels:
-    """A picture: (height, width, 3 or 4) of uint8 or float32, row 0 on top."""
+    """A picture: (height, width, 3 or 4) of uint8 or float32, row 0 on top.
+
+    `tiles`: how many of UDIM stand in it side by side and above one another.
+    """
 
     values: np.ndarray
     colorspace: str
+    tiles: tuple[int, int] = (1, 1)
 
     def linear(self) -> np.ndarray:
         """The decoded picture as (height, width, 4) float32."""
@@ -40,13 +45,6 @@ class Pixels:
         return values
 
 
-def srgb_to_linear(values: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1 decoding."""
-    low = values / np.float32(12.92)
-    high = ((np.maximum(values, 0.0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
-    return np.where(values <= 0.04045, low, high)
-
-
 def _colorspace(image: bpy.types.Image, log: ExportLog) -> str:
     name = image.colorspace_settings.name
     if image.is_float:
@@ -58,34 +56,60 @@ def _colorspace(image: bpy.types.Image, log: ExportLog) -> str:
     return _COLORSPACES.get(name, "srgb")
 
 
-def read_image(image: bpy.types.Image, log: ExportLog, *, straight_alpha: bool) -> Pixels | None:
-    """The pixels of an image; None if they cannot be had.
+def read_image(
+    image: bpy.types.Image,
+    user: bpy.types.ImageUser,
+    log: ExportLog,
+    *,
+    straight_alpha: bool,
+) -> Pixels | None:
+    """The pixels of an image as a node shows it; None if they cannot be had.
 
     With `straight_alpha` the colours are free of the alpha channel, as a shader that uses the alpha
     wants them; otherwise they are multiplied by it, as Cycles does unless the image says not to.
     """
-    width, height = image.size
-    if width == 0 or height == 0:
+    found = _from_files(image, user, log) or _loaded(image)
+    if found is None:
         return None
-    if image.source == "TILED":
-        log.warn(
-            f"Image '{image.name}': UDIM tiles are not supported, the first tile is used everywhere"
-        )
-    elif image.source in {"SEQUENCE", "MOVIE"}:
-        log.warn(
-            f"Image '{image.name}': image sequences are not supported, the frame now loaded is used"
-        )
-    values = np.empty(4 * width * height, np.float32)
-    image.pixels.foreach_get(values)
-    values = values.reshape(height, width, 4)[::-1]
-    values = _alpha(image, values, straight_alpha)
+    values = _alpha(image, found.values, straight_alpha)
     if not image.is_float:
         # Byte images come as value / 255, so this is exact.
         values = np.rint(values * np.float32(255.0)).clip(0, 255).astype(np.uint8)
     opaque = 255 if values.dtype == np.uint8 else 1.0
     if (values[..., 3] == opaque).all():
         values = values[..., :3]
-    return Pixels(np.ascontiguousarray(values), _colorspace(image, log))
+    return Pixels(np.ascontiguousarray(values), _colorspace(image, log), found.counts)
+
+
+def _from_files(
+    image: bpy.types.Image, user: bpy.types.ImageUser, log: ExportLog
+) -> FromFiles | None:
+    """The pixels of what has several files; None for all else, and where they cannot be read."""
+    kind, instead = {
+        "TILED": ("its UDIM tiles", "the first tile is used everywhere"),
+        "SEQUENCE": ("the frame of its sequence", "the frame now loaded is used"),
+        "MOVIE": ("frames of movies", "the frame now loaded is used"),
+    }.get(image.source, ("", ""))
+    try:
+        if image.source == "TILED":
+            return read_tiles(image)
+        if image.source == "SEQUENCE":
+            return read_frame(image, user)
+        if kind:
+            log.warn(f"Image '{image.name}': {kind} are not supported, {instead}")
+    except UnreadableError as reason:
+        log.warn(f"Image '{image.name}': {kind} cannot be read ({reason}), {instead}")
+    return None
+
+
+def _loaded(image: bpy.types.Image) -> FromFiles | None:
+    """The pixels that Blender has, of one file."""
+    width, height = image.size
+    if width == 0 or height == 0:
+        return None
+    values = np.empty(4 * width * height, np.float32)
+    image.pixels.foreach_get(values)
+    return FromFiles(values.reshape(height, width, 4)[::-1])
 
 
 def _alpha(image: bpy.types.Image, values: np.ndarray, straight: bool) -> np.ndarray:

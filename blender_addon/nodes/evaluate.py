@@ -192,7 +192,8 @@ class Evaluator:
             node.bl_idname in {"ShaderNodeTexImage", "ShaderNodeTexEnvironment"}
             and node.image is not None
         ):
-            source = self.textures.source(node.image, straight_alpha=output.identifier == "Alpha")
+            straight = output.identifier == "Alpha"
+            source = self.textures.source(node.image, node.image_user, straight)
             channel = "a" if output.identifier == "Alpha" else "rgb"
             return average(ImageValue(source, Sampling("uv", AS_IT_IS), kind, channel))
         colors = [entry for entry in node.inputs if entry.type == "RGBA" and entry.enabled]

@@ -34,11 +34,18 @@ NOISE = ("detail", "roughness", "lacunarity", "distortion")
 
 
 class BlenderSource:
-    """An image of the .blend file, read when it is first needed."""
+    """An image of the .blend file as a node shows it, read when it is first needed."""
 
-    def __init__(self, image: bpy.types.Image, straight_alpha: bool, log: ExportLog) -> None:
+    def __init__(
+        self,
+        image: bpy.types.Image,
+        user: bpy.types.ImageUser,
+        straight_alpha: bool,
+        log: ExportLog,
+    ) -> None:
         self.name = image.name
         self._image = image
+        self._user = user
         self._straight = straight_alpha
         self._log = log
         self._pixels: Pixels | None = None
@@ -47,7 +54,9 @@ class BlenderSource:
     def pixels(self) -> Pixels:
         """The pixels as Blender stores them; magenta for an image that cannot be read."""
         if self._pixels is None:
-            self._pixels = read_image(self._image, self._log, straight_alpha=self._straight)
+            self._pixels = read_image(
+                self._image, self._user, self._log, straight_alpha=self._straight
+            )
         if self._pixels is None:
             self._log.warn(f"Image '{self.name}': it cannot be read, magenta is used")
             self._pixels = Pixels(np.array([[[1.0, 0.0, 1.0]]], np.float32), "linear")
@@ -72,7 +81,7 @@ class TextureStore:
     def __init__(self, scene: Any, log: ExportLog) -> None:
         self._scene = scene
         self._log = log
-        self._sources: dict[tuple[int, bool], BlenderSource] = {}
+        self._sources: dict[tuple[int, str, bool], BlenderSource] = {}
         self._images: dict[int, tuple[ImageSource, int]] = {}
         self._textures: dict[str, int] = {}
         #: How far meshes reach from their origins, and from that of the scene.
@@ -86,11 +95,14 @@ class TextureStore:
         # Those that were asked for since this was last cleared.
         self.asked: set[str] = set()
 
-    def source(self, image: bpy.types.Image, straight_alpha: bool) -> BlenderSource:
-        """The source for an image, one for each treatment of its alpha."""
-        key = (image.as_pointer(), straight_alpha)
+    def source(
+        self, image: bpy.types.Image, user: bpy.types.ImageUser, straight_alpha: bool
+    ) -> BlenderSource:
+        """The source for what a node shows of an image, one for each treatment of its alpha."""
+        path = image.filepath_from_user(image_user=user) if image.source == "SEQUENCE" else ""
+        key = (image.as_pointer(), path, straight_alpha)
         if key not in self._sources:
-            self._sources[key] = BlenderSource(image, straight_alpha, self._log)
+            self._sources[key] = BlenderSource(image, user, straight_alpha, self._log)
         return self._sources[key]
 
     def place(

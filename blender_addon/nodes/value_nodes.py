@@ -94,18 +94,21 @@ def _image(
         ev.warn(node, f"{node.interpolation.lower()} interpolation", "linear is used")
     straight = not environment and is_linked(node.outputs["Alpha"])
     texture_filter = "closest" if node.interpolation == "Closest" else "linear"
-    source = ev.textures.source(node.image, straight_alpha=straight)
+    source = ev.textures.source(node.image, node.image_user, straight)
     if not environment:
-        wrap = _WRAP[node.extension]
+        tiled = node.image.source == "TILED"
+        wrap = "black" if tiled else _WRAP[node.extension]
         if node.projection != "FLAT":
             place = as_value(ev, place)
+        uv, transform, at = "", AS_IT_IS, None
         if isinstance(place, Coordinates):
             uv, transform = ev.textures.place(place)
-            sampling = Sampling("uv", transform, uv, wrap, texture_filter)
         else:
-            sampling = Sampling(
-                "uv", AS_IT_IS, "", wrap, texture_filter, place, projection=_projection(node)
-            )
+            at = place
+        if tiled:
+            across, up = source.pixels().tiles
+            transform = (*(x / across for x in transform[:3]), *(y / up for y in transform[3:]))
+        sampling = Sampling("uv", transform, uv, wrap, texture_filter, at, _projection(node))
     elif place.point() is not None:
         return pick(source, *equirectangular(place.point()), texture_filter)
     else:

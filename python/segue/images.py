@@ -106,6 +106,21 @@ def _read_file(path: str) -> Picture:
     return Picture(pixels, str(wrap))
 
 
+def resized(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
+    """A picture (h, w, c) at another size, of the same pixel type, filtered."""
+    if pixels.shape[:2] == (height, width):
+        return pixels
+    oiio = _oiio()
+    channels = pixels.shape[2]
+    smaller = oiio.ImageBufAlgo.resize(
+        oiio.ImageBuf(np.ascontiguousarray(pixels)),
+        roi=oiio.ROI(0, width, 0, height, 0, 1, 0, channels),
+    )
+    return np.asarray(smaller.get_pixels(str(pixels.dtype).replace("float16", "half"))).reshape(
+        height, width, channels
+    )
+
+
 def _channels(names: list[str]) -> list[int]:
     """Which channels to take, in the order grey, alpha or red, green, blue, alpha."""
     lower = [n.lower().rsplit(".", 1)[-1] for n in names]

@@ -18,6 +18,7 @@ MODULES = {
     "extension": "installed",
     "failures": "fake",
     "geometry": "fake",
+    "images": "real",
     "lights": "fake",
     "materials": "fake",
     "nodes": "fake",

@@ -367,17 +367,56 @@ def test_an_unknown_node_on_an_input_is_said():
     assert "diffuseColor" in said
 
 
-def test_displacement_is_said():
-    _, imported = load(
-        MESH
-        + preview("float inputs:displacement = 0.5\ntoken outputs:displacement").replace(
-            "token outputs:surface.connect",
-            "token outputs:displacement.connect = </Look/S.outputs:displacement>\n"
-            "token outputs:surface.connect",
-            1,
-        )
+def displaced(inputs, more=""):
+    """The material of a mesh whose displacement is that of its UsdPreviewSurface."""
+    return material(
+        inputs + "\ntoken outputs:displacement",
+        "token outputs:displacement.connect = </Look/S.outputs:displacement>\n" + more,
     )
-    assert reported(imported, usd.Kind.UNSUPPORTED) == [("/Look", "displacement")]
+
+
+HEIGHTS = """def Shader "H" {
+    uniform token info:id = "UsdPrimvarReader_float"
+    string inputs:varname = "height"
+    float outputs:result
+}"""
+TEXTURED = "float inputs:displacement.connect = </Look/H.outputs:result>"
+
+
+def test_displacement_moves_the_surface():
+    description, imported = displaced("float inputs:displacement = 0.5")
+    assert imported.report.entries == []
+    moved = {"height": 0.5, "space": "object", "keeps_normals": False}
+    assert description["displacement"] == moved
+    assert "normal" not in description["surface"]
+    # None is none, and without the material's output the node's input says nothing.
+    for description, _ in (
+        displaced("float inputs:displacement = 0"),
+        displaced(""),
+        material("float inputs:displacement = 0.5\ntoken outputs:displacement"),
+    ):
+        assert set(description) == {"surface"}
+
+
+def test_textured_displacement_is_also_a_bump_map():
+    """So that coarse meshes show it."""
+    description, imported = displaced(TEXTURED, HEIGHTS)
+    assert not reported(imported, usd.Kind.UNSUPPORTED)
+    ((_, what),) = reported(imported, usd.Kind.WARNING)
+    assert "primvar height" in what
+    height = description["displacement"]["height"]
+    assert height["channel"] == "r"
+    assert description["displacement"]["keeps_normals"]
+    assert description["surface"]["normal"] == {"height": height, "space": "object"}
+
+
+def test_displacement_by_another_node_is_said():
+    _, imported = material(
+        "",
+        "token outputs:displacement.connect = </Look/H.outputs:displacement>\n"
+        + HEIGHTS.replace("float outputs:result", "token outputs:displacement"),
+    )
+    assert reported(imported, usd.Kind.UNSUPPORTED) == [("/Look", "displacement by another node")]
 
 
 def test_one_description_is_one_material():

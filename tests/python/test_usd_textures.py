@@ -11,7 +11,7 @@ pytest.importorskip("OpenImageIO")
 import OpenImageIO as oiio  # noqa: N813
 from pxr import Sdf, Usd
 
-from segue import usd
+from segue import tiles, usd
 from stages import load_file, reported
 
 NETWORK = """#usda 1.0
@@ -277,13 +277,45 @@ def test_a_truncated_file_is_named(tmp_path):
     assert "t.png" in what
 
 
-def test_udim_is_said(tmp_path):
-    write(tmp_path / "t.1001.png", gradient(3))
+def flat(size, value):
+    return np.full((size, size, 3), value, np.uint8)
+
+
+def test_udim_tiles_are_joined(tmp_path):
+    """From the bottom left to the right and upwards; what is missing is black."""
+    for number, size, value in ((1001, 4, 10), (1003, 2, 30), (1012, 4, 120)):
+        write(tmp_path / f"t.{number}.png", flat(size, value))
     scene, imported = import_network(tmp_path, "asset inputs:file = @./t.<UDIM>.png@")
-    ((path, what),) = reported(imported, usd.Kind.UNSUPPORTED)
+    assert not reported(imported, usd.Kind.UNSUPPORTED)
+    assert not reported(imported, usd.Kind.WARNING)
+    ((_, pixels, colorspace),) = scene.images
+    assert colorspace == "srgb"
+    assert pixels.shape == (8, 12, 3)
+    assert pixels[::4, ::4, 0].tolist() == [[0, 120, 0], [10, 0, 30]]
+    (texture,) = (item for item in scene.textures if item["type"] == "image")
+    np.testing.assert_allclose(texture["transform"], [1 / 3, 0, 0, 0, 1 / 2, 0])
+
+
+def test_udim_tiles_that_do_not_fit_are_named(tmp_path):
+    """Where there is none, and where they are of several kinds."""
+    _, imported = import_network(tmp_path, "asset inputs:file = @./t.<UDIM>.png@")
+    ((path, what),) = reported(imported, usd.Kind.WARNING)
     assert path == "/Look/T"
-    assert "UDIM" in what
-    assert len(scene.images) == 1
+    assert "t.<UDIM>.png does not exist" in what
+    write(tmp_path / "t.1001.png", gradient(3))
+    write(tmp_path / "t.1002.png", gradient(4))
+    _, imported = import_network(tmp_path, "asset inputs:file = @./t.<UDIM>.png@")
+    ((_, what),) = reported(imported, usd.Kind.WARNING)
+    assert "differ" in what
+
+
+def test_large_tiles_are_reduced(tmp_path):
+    for number in (1001, 1002):
+        write(tmp_path / f"{number}.png", flat(8, number - 1000))
+    paths = {number: str(tmp_path / f"{number}.png") for number in (1001, 1002)}
+    tiled = tiles.join(paths, most_bytes=8 * 8 * 3)
+    assert (tiled.reduction, tiled.counts) == (2, (2, 1))
+    assert tiled.picture.pixels[..., 0].tolist() == [[1] * 4 + [2] * 4] * 4
 
 
 NORMAL = "normal3f inputs:normal.connect = </Look/T.outputs:rgb>\nfloat inputs:ior = 1"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ..scene import Scene
@@ -36,6 +37,7 @@ class Surface:
         opacity: presence: below 1 light passes straight through.
         emission: its glow; None if it does not glow.
         primvars: names of the mesh attributes its textures read.
+        displacement: how far it moves the mesh, as the ABI writes it; None if it does not.
     """
 
     name: str
@@ -43,12 +45,15 @@ class Surface:
     opacity: Value
     emission: Value | None
     primvars: frozenset[str]
+    displacement: dict[str, Any] | None = None
 
     def json(self, strength: Value) -> dict[str, Any]:
         """The ABI's description, the glow multiplied by the strength."""
         result: dict[str, Any] = {"surface": with_emission(self.closure, self.emission, strength)}
         if self.opacity != 1:
             result["opacity"] = self.opacity
+        if self.displacement is not None:
+            result["displacement"] = self.displacement
         return result
 
 
@@ -77,8 +82,12 @@ def is_constant(v: Value, number: float) -> bool:
 class _Node:
     """Reads the inputs of one UsdPreviewSurface node and remembers the primvars they need."""
 
-    def __init__(self, node: UsdShade.Shader, textures: Textures, inputs: Inputs) -> None:
+    def __init__(
+        self, node: UsdShade.Shader, textures: Textures, inputs: Inputs, *, moves: bool = False
+    ) -> None:
+        """`moves`: whether the material's displacement is this node's."""
         self.node = node
+        self._moves = moves
         self.primvars: set[str] = set()
         self._textures = textures
         self._inputs = inputs
@@ -127,11 +136,29 @@ class _Node:
         self.primvars.add(read.coordinates.primvar)
         return {"texture": read.id, "channel": "r"}
 
+    @cached_property
+    def height(self) -> Value:
+        """How far the surface moves along its normal, in its own space."""
+        return self.number("displacement", 0.0) if self._moves else 0.0
+
+    def displacement(self) -> dict[str, Any] | None:
+        """What moves the mesh, as the key of a material."""
+        height = self.height
+        if is_constant(height, 0):
+            return None
+        bumpy = "height" in (self.normal or {})
+        return {"height": height, "space": "object", "keeps_normals": bumpy}
+
+    @cached_property
     def normal(self) -> dict[str, Any] | None:
-        """The normal map, as the key that scattering closures take."""
+        """The normal map, as the key that scattering closures take.
+
+        Without one a textured displacement is also seen where the mesh is too coarse to show it.
+        """
         found = self._inputs.source(self.node, "normal")
         if not is_node(found):
-            return None
+            height = self.height
+            return {"height": height, "space": "object"} if isinstance(height, dict) else None
         node, output = found
         kind = node.GetIdAttr().Get()
         if kind != "UsdUVTexture" or output != "rgb":
@@ -192,16 +219,15 @@ def read_surface(material: UsdShade.Material, textures: Textures, inputs: Inputs
             what = f"the surface '{found}'" if found else "a material without a surface"
             report.unsupported(prim, what, "displayColor or grey 0.18 is used")
             return None
-    for output, what in (
-        (material.GetDisplacementOutput(), "displacement"),
-        (material.GetVolumeOutput(), "a volume"),
-    ):
-        if output and output.HasConnectedSource():
-            if what == "displacement" and inputs.source(node, what) in (None, 0.0):
-                continue
-            report.unsupported(prim, what, "it is ignored")
+    volume = material.GetVolumeOutput()
+    if volume and volume.HasConnectedSource():
+        report.unsupported(prim, "a volume", "it is ignored")
+    moving = material.ComputeDisplacementSource()[0]
+    if moving and moving.GetPrim() != node.GetPrim():
+        report.unsupported(prim, "displacement by another node", "it is ignored")
     check_color_space(node.GetPrim(), report)
-    return _surface(_Node(node, textures, inputs), report)
+    moves = bool(moving) and moving.GetPrim() == node.GetPrim()
+    return _surface(_Node(node, textures, inputs, moves=moves), report)
 
 
 def _other_context(material: UsdShade.Material) -> tuple[UsdShade.Shader | None, str]:
@@ -221,6 +247,7 @@ def _other_context(material: UsdShade.Material) -> tuple[UsdShade.Shader | None,
 def _surface(inputs: _Node, report: Report) -> Surface:
     opaque = _opaque_closure(inputs)
     emission = inputs.color("emissiveColor", 0.0)
+    displacement = inputs.displacement()
     threshold = inputs.threshold()
     mode = str(inputs.constant("opacityMode", "transparent"))
     presence: Value = 1
@@ -254,6 +281,7 @@ def _surface(inputs: _Node, report: Report) -> Surface:
         presence,
         None if is_constant(emission, 0) else emission,
         frozenset(inputs.primvars),
+        displacement,
     )
 
 
@@ -266,7 +294,7 @@ def _opaque_closure(inputs: _Node) -> Closure:
     specular_workflow = bool(inputs.constant("useSpecularWorkflow", 0))
     specular = inputs.color("specularColor", 0.0) if specular_workflow else None
     metallic = 0.0 if specular_workflow else inputs.number("metallic", 0.0)
-    normal = inputs.normal()
+    normal = inputs.normal
     common = {} if normal is None else {"normal": normal}
     if is_constant(coat, 0):
         # ior 1 reflects nothing, unless the specular workflow gives its own reflectance.
@@ -303,7 +331,7 @@ def _clear_closure(inputs: _Node) -> Closure:
     ior = inputs.number("ior", 1.5)
     if is_constant(ior, 1):
         return {"type": "transparent", "color": 1}
-    normal = inputs.normal()
+    normal = inputs.normal
     return {
         "type": "glass",
         "color": 1,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import images
+from .. import images, tiles
 from ..scene import Scene
 from ._pxr import Ar, Sdf, Usd, UsdShade
 from .inputs import Inputs, is_node
@@ -66,13 +66,17 @@ class ImageTexture:
 
 @dataclass(frozen=True)
 class _Loaded:
-    """An image of the scene and what its file said."""
+    """An image of the scene and what its file said.
+
+    `tiles`: by what texture coordinates are divided, where it is made of such.
+    """
 
     id: int
     has_alpha: bool
     is_8_bit: bool
     channels: int
     wrap: str
+    tiles: tuple[int, int] = (1, 1)
 
 
 class Textures:
@@ -158,12 +162,14 @@ class Textures:
             )
             scale, bias = [2.0, 2.0, 2.0, 1.0], [-1.0, -1.0, -1.0, 0.0]
         coordinates = self._coordinates(shader)
+        across, up = loaded.tiles
+        of_tiles = Coordinates("", np.diag([1.0 / across, 1.0 / up, 1.0]) @ coordinates.matrix)
         wraps = loaded.wrap.split(",") if loaded.wrap else []
         texture: dict[str, Any] = {
             "type": "image",
             "image": loaded.id,
             "uv": coordinates.primvar,
-            "transform": coordinates.transform,
+            "transform": of_tiles.transform,
             "wrap_s": self._wrap(shader, "wrapS", wraps[0] if wraps else ""),
             "wrap_t": self._wrap(shader, "wrapT", wraps[-1] if wraps else ""),
             "scale": scale,
@@ -246,26 +252,33 @@ class Textures:
     ) -> _Loaded | str:
         """The image of an asset, or what is wrong with it."""
         path = asset.resolvedPath
-        if "<UDIM>" in asset.path:
-            path = self._first_tile(attribute, asset)
-            self._report.unsupported(
-                attribute.GetPrim(),
-                f"the UDIM texture {asset.path}",
-                "its tile 1001 is used everywhere" if path else "it is taken as missing",
-            )
+        found: dict[int, str] = {}
+        if tiles.MARK in asset.path:
+            found = self._tiles(attribute, asset)
+            path = found[min(found)] if found else ""
         if not path:
             return f"the file {asset.path} does not exist"
-        key = (path, space, None if mask is None else repr(mask))
+        key = (path, bool(found), space, None if mask is None else repr(mask))
         if key not in self._images:
             try:
-                self._images[key] = self._add_image(path, space, mask)
+                if found:
+                    tiled = tiles.join(found)
+                    if tiled.reduction > 1:
+                        self._report.warning(
+                            attribute.GetPrim(),
+                            f"the tiles of {asset.path} take too much memory",
+                            f"their resolution is divided by {tiled.reduction}",
+                        )
+                    added = self._add_image(asset.path, tiled.picture, space, mask)
+                    self._images[key] = replace(added, tiles=tiled.counts)
+                else:
+                    self._images[key] = self._add_image(path, images.read(path), space, mask)
             except images.ImageError as error:
                 text = " ".join(str(error).split())
                 self._images[key] = f"the file {asset.path} cannot be read ({text})"
         return self._images[key]
 
-    def _add_image(self, path: str, space: str, mask: Any) -> _Loaded:
-        picture = images.read(path)
+    def _add_image(self, path: str, picture: images.Picture, space: str, mask: Any) -> _Loaded:
         pixels = picture.pixels
         colorspace = _colorspace(picture, space)
         if mask is not None:
@@ -275,14 +288,18 @@ class Textures:
             number, picture.has_alpha, picture.is_8_bit, picture.pixels.shape[2], picture.wrap
         )
 
-    def _first_tile(self, attribute: Usd.Attribute, asset: Sdf.AssetPath) -> str:
-        relative = asset.path.replace("<UDIM>", "1001")
+    def _tiles(self, attribute: Usd.Attribute, asset: Sdf.AssetPath) -> dict[int, str]:
+        """The files of a UDIM texture by the numbers of their tiles."""
         for spec in attribute.GetPropertyStack(Usd.TimeCode.Default()):
-            anchored = spec.layer.ComputeAbsolutePath(relative)
-            resolved = Ar.GetResolver().Resolve(anchored)
-            if resolved:
-                return str(resolved.GetPathString())
-        return ""
+            found = {}
+            for number in range(tiles.FIRST, tiles.LAST + 1):
+                relative = asset.path.replace(tiles.MARK, str(number))
+                resolved = Ar.GetResolver().Resolve(spec.layer.ComputeAbsolutePath(relative))
+                if resolved:
+                    found[number] = str(resolved.GetPathString())
+            if found:
+                return found
+        return {}
 
 
 def _colorspace(picture: images.Picture, space: str) -> str:
