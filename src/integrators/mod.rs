@@ -48,7 +48,7 @@ pub struct Counters {
     /// Most segments of an iteration, where there are any.
     pub segments: AtomicU64,
     /// What turned out not to pay and is left out, where an integrator looks.
-    pub left_out: Mutex<Option<String>>,
+    pub left_out: Mutex<Vec<String>>,
     /// What an integrator knows of its systematic error.
     pub hints: Mutex<Hints>,
     /// Contributions of segments that were not finite and were dropped.

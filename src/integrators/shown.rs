@@ -21,6 +21,11 @@ impl Shown {
         Some(Self(luminances.collect()))
     }
 
+    /// Of one sample of every pixel.
+    pub fn of_samples(samples: impl Iterator<Item = Vec3>) -> Self {
+        Self(samples.map(|s| luminance(s).max(0.0)).collect())
+    }
+
     /// By which the brightness of each pixel is judged.
     pub fn scales(&self) -> impl Iterator<Item = f32> {
         let mean = self.0.iter().map(|&l| f64::from(l)).sum::<f64>() / self.0.len() as f64;

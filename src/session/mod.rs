@@ -405,11 +405,7 @@ impl Session {
             height: self.film.height(),
             stop_reason: state.stop_reason,
             stages,
-            left_out: [
-                self.world.needs().left_out(),
-                locked(&self.counters.left_out).iter().cloned().collect(),
-            ]
-            .concat(),
+            left_out: [self.world.needs().left_out(), locked(&self.counters.left_out).clone()].concat(),
             warnings: self.warnings.clone(),
             curve: state.curve.clone(),
         }

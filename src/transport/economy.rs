@@ -11,6 +11,8 @@
 //! What fewer light paths lose at deeper arrivals is told too low, in some scenes by a factor of three, in others not at
 //! all. Where that decides, one iteration with fewer is a trial, and the pictures tell ([`Trial`]).
 
+mod filter;
+
 use super::Cut;
 use super::cluster::Cluster;
 use super::exchange::{Densities, GRAIN, emitted_share, has_end};
@@ -20,8 +22,11 @@ use super::weigh::{Sampled, Weights, next_event_density};
 use crate::math::SharedExponent;
 use crate::shading::SurfaceClass;
 use crate::shading::bsdf::Bsdf;
+use filter::FilterEconomy;
 use glam::Vec3;
 use rayon::prelude::*;
+
+pub use filter::Work;
 
 /// Numbers of light paths that are compared, as shares of all.
 const SHARES: [f32; 4] = [0.0, 1.0 / 16.0, 0.25, 1.0];
@@ -60,11 +65,14 @@ pub struct Economy {
     share: f32,
     /// A smaller one that may, which the next iteration tries.
     trial: Option<Trial>,
+    /// Whether filtering pays without light paths.
+    filter: FilterEconomy,
 }
 
 impl Default for Economy {
     fn default() -> Self {
-        Self { errors: [0.0; SHARES.len()], costs: [0.0; SHARES.len()], share: 1.0, trial: None }
+        let filter = FilterEconomy::default();
+        Self { errors: [0.0; SHARES.len()], costs: [0.0; SHARES.len()], share: 1.0, trial: None, filter }
     }
 }
 
@@ -86,6 +94,21 @@ pub struct Departure {
     pub deviation: f64,
     /// Iterations before, which that mean is of where this one looks.
     pub before: u32,
+}
+
+impl Departure {
+    fn squared(&self) -> f64 {
+        self.deviation * self.deviation
+    }
+}
+
+/// What must not be left out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Must {
+    /// Some light paths: there may be light that camera paths cannot find.
+    pub have_light_paths: bool,
+    /// Filtering.
+    pub filter: bool,
 }
 
 /// What some technique may bring to a cluster.
@@ -113,7 +136,12 @@ impl Economy {
 
     /// Whether iteration `index` has to be compared to those before.
     pub fn compares(&self, index: u32) -> bool {
-        Self::looks(index) || self.trial.is_some()
+        Self::looks(index) || self.trial.is_some() || self.filter.compares()
+    }
+
+    /// Whether iteration `index` filters, and does not trace paths instead.
+    pub fn filters(&self, index: u32) -> bool {
+        Self::looks(index) || self.filter.filters()
     }
 
     /// How many of `all` light paths iteration `index` should sample.
@@ -127,10 +155,15 @@ impl Economy {
     }
 
     /// What is left out, for the log and the statistics.
-    pub fn left_out(&self) -> Option<String> {
+    pub fn left_out(&self) -> Vec<String> {
         let percent = 100.0 * (1.0 - self.share);
         let why = "they cost more than they bring here";
-        (self.share < 1.0).then(|| format!("light paths, {percent:.0} % of them in most iterations: {why}"))
+        let light = (self.share < 1.0)
+            .then(|| format!("light paths, {percent:.0} % of them in most iterations: {why}"));
+        let filter = self.filter.is_left_out().then(|| {
+            "filtering in most iterations: camera paths by themselves have less error here".to_string()
+        });
+        light.into_iter().chain(filter).collect()
     }
 
     /// Looks at an iteration that sampled all light paths, which were so many, or at one of its bands, which share their
@@ -150,13 +183,23 @@ impl Economy {
         self.costs.iter_mut().zip(costs).for_each(|(sum, v)| *sum += v);
     }
 
-    /// Judges after iteration `index`, by what was seen in it. `some`: whether some light paths there must be, since
-    /// there may be light that camera paths cannot find.
-    pub fn judge(&mut self, index: u32, departure: Departure, some: bool) {
-        let Departure { deviation, before } = departure;
-        let squared = deviation * deviation;
+    /// Whether iteration `index` tells if filtering pays, if it filters.
+    pub fn weighs_filter(&self, index: u32) -> bool {
+        self.filter.compares() && !Self::looks(index)
+    }
+
+    /// Judges whether filtering pays, see [`FilterEconomy::judge_filtered`].
+    pub fn judge_filter(&mut self, departure: Departure, own: f64, error_over_noise: f64, work: Work) {
+        self.filter.judge_filtered(departure, own, error_over_noise, work);
+    }
+
+    /// Judges how many light paths pay after iteration `index`, by what was seen in it.
+    pub fn judge(&mut self, index: u32, departure: Departure, must: Must) {
+        let (squared, before) = (departure.squared(), departure.before);
+        let mut looked = before;
         if Self::looks(index) {
-            let [surely, perhaps] = [UNTOLD, TOLD].map(|factor| self.best(factor, usize::from(some)));
+            let [surely, perhaps] =
+                [UNTOLD, TOLD].map(|factor| self.best(factor, usize::from(must.have_light_paths)));
             let is_open = surely == ALL && perhaps != ALL && before > 0;
             self.trial = is_open.then_some(Trial { share: perhaps, with_all: squared, before });
             // what is open stays as it is until it has been tried
@@ -164,12 +207,23 @@ impl Economy {
                 self.share = SHARES[surely];
             }
         } else if let Some(Trial { share, with_all, before }) = self.trial.take() {
+            looked = before;
             // the mean varies as well, about as much as so many iterations with all light paths
             let of_mean = with_all / f64::from(before + 1);
             let (with_fewer, with_all) = ((squared - of_mean).max(0.0), with_all - of_mean);
             let pays = PROVEN * with_fewer * self.costs[share] < with_all * self.costs[ALL];
             self.share = if pays { SHARES[share] } else { 1.0 };
         }
+        match self.share > 0.0 || must.filter {
+            true => self.filter.keep(),
+            false if self.trial.is_none() => self.filter.begin(looked),
+            false => {}
+        }
+    }
+
+    /// Judges after an iteration that traced paths.
+    pub fn judge_paths(&mut self, departure: Departure) {
+        self.filter.judge_unfiltered(departure);
     }
 
     /// The share, from number `least` on, at which error times cost is least, if what fewer light paths add to the

@@ -86,6 +86,11 @@ impl Techniques {
     pub fn can_do_without_light_paths(&self) -> bool {
         self.camera_paths && self.next_event && self.estimator == Estimator::LeaveOneOut
     }
+
+    /// Whether they are not those of `segment` as it is meant, whose pictures may also be made without filtering.
+    pub fn is_for_comparison(&self) -> bool {
+        !self.kernel.adapts() || self.light_paths == 0.0 || self.bridges.is_some()
+    }
 }
 
 impl Default for Techniques {

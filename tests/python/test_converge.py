@@ -143,7 +143,7 @@ def test_the_table(report):
     text = (report / "table1.md").read_text()
     for method in METHODS:
         assert f"| {method} | sampling |" in text
-    shares = re.findall(r"\| segment \| \w+ \| [\d.]+ \| ([\d.]+) % \|", text)
+    shares = re.findall(r"\| segment \| [\w ]+ \| [\d.]+ \| ([\d.]+) % \|", text)
     assert sum(map(float, shares)) == pytest.approx(100, abs=0.5)
 
 

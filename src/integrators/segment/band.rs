@@ -8,7 +8,8 @@ use crate::math::sampler::hash;
 use crate::shading::{SurfaceClass, World};
 use crate::transport::bridge::{BridgeSampler, Bridges, Choice};
 use crate::transport::camera::{CameraSampler, Primary};
-use crate::transport::cluster::{Areas, Clusters, Numbered};
+use crate::transport::cluster::{Areas, Cluster, Clusters, Numbered};
+use crate::transport::economy::Work;
 use crate::transport::glances;
 use crate::transport::grid::Grid;
 use crate::transport::light::LightSampler;
@@ -90,6 +91,20 @@ impl Band {
     /// Basic radiance that is reflected at the end of a primary segment.
     pub fn seen(&self, sampled: Sampled, primary: &Primary) -> Vec3 {
         primary.arrival.map_or(Vec3::ZERO, |a| self.reflected.towards_camera(sampled, a as usize))
+    }
+
+    /// What was done up to the film but for rays, as far as it would have been without light paths.
+    pub fn work(&self) -> Work {
+        let of_cluster = |c: &Cluster| match c.class {
+            SurfaceClass::Diffuse => 0,
+            SurfaceClass::Reflecting | SurfaceClass::Transmitting => u64::from(c.cameras).pow(2),
+        };
+        Work {
+            rays: 0,
+            pixels: self.primaries.len() as u64,
+            arrivals: self.camera.arrivals.len() as u64,
+            pairs: self.clusters.clusters.iter().map(of_cluster).sum(),
+        }
     }
 
     /// All stages up to the film. Returns `false` if it was stopped.

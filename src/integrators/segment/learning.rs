@@ -9,7 +9,7 @@ use crate::math::sampler::hash;
 use crate::math::{LUMINANCE, luminance};
 use crate::transport::adaptation::{Adaptation, Look};
 use crate::transport::camera::Primary;
-use crate::transport::economy::{Departure, Economy};
+use crate::transport::economy::{Departure, Economy, Must, Work};
 use crate::transport::glances::Glances;
 use crate::transport::guiding::{Guiding, Outcome, Start};
 use crate::transport::{Cut, Techniques};
@@ -27,10 +27,12 @@ pub(super) struct Learnt {
     pub adaptation: Adaptation,
     /// How often pixels look for light on their primary segments.
     pub glances: Glances,
-    /// How many light paths pay.
+    /// How many light paths pay, and whether filtering does.
     economy: Economy,
-    /// For every band, the picture before the last iteration that looked whether they do.
-    yardsticks: Vec<Shown>,
+    /// Every band, and the picture there before the last iteration that looked whether they do.
+    yardsticks: Vec<(Rect, Shown)>,
+    /// Iterations that filtered.
+    filtered: u32,
 }
 
 /// What is found out about an iteration while its bands are made.
@@ -49,6 +51,11 @@ pub(super) struct Lessons {
     bands: usize,
     /// How far its picture is from those before.
     deviation: f64,
+    /// Whether it tells if filtering pays; how far its camera paths by themselves are from those pictures.
+    weighs_filter: bool,
+    own_deviation: f64,
+    /// What it had to do.
+    work: Work,
     /// Sum of what bands have beyond the camera's own paths.
     beyond: f64,
 }
@@ -57,6 +64,11 @@ impl Learnt {
     /// How many of so many light paths an iteration samples.
     pub fn light_paths(&self, context: &Context, techniques: &Techniques, all: f32, index: u32) -> f32 {
         if is_thrifty(context, techniques) { self.economy.light_paths(all, index) } else { all }
+    }
+
+    /// Whether an iteration filters, and does not trace paths instead.
+    pub fn filters(&self, context: &Context, techniques: &Techniques, index: u32) -> bool {
+        !is_thrifty(context, techniques) || self.economy.filters(index)
     }
 
     /// Begins an iteration whose light paths are sampled: so many, of which `arrived` arrived somewhere.
@@ -89,6 +101,9 @@ impl Learnt {
             light_paths,
             bands,
             deviation: 0.0,
+            weighs_filter: compares && self.economy.weighs_filter(index),
+            own_deviation: 0.0,
+            work: Work::default(),
             beyond: 0.0,
         }
     }
@@ -128,9 +143,15 @@ impl Learnt {
         if let Some(before) = before {
             let latest = before.latest(&after, context.completed);
             if lessons.looks {
-                self.yardsticks.push(before);
+                self.yardsticks.push((place, before));
             }
-            lessons.deviation += self.yardsticks.get(k).map_or(0.0, |y| y.deviation(&latest));
+            lessons.deviation += self.yardsticks.get(k).map_or(0.0, |(_, y)| y.deviation(&latest));
+            if lessons.weighs_filter {
+                let own = band.primaries.iter().map(|p| p.light + p.weight * p.unfiltered);
+                let own = Shown::of_samples(own);
+                lessons.own_deviation += self.yardsticks.get(k).map_or(0.0, |(_, y)| y.deviation(&own));
+                lessons.work += band.work();
+            }
         }
         if lessons.guides || lessons.looks {
             let bytes = self.learn(context, band, &after, lessons, cut);
@@ -182,11 +203,14 @@ impl Learnt {
             return;
         }
         let done = context.completed + 1;
+        self.filtered += 1;
         let kernel = lessons.techniques.kernel;
         if kernel.adapts() {
             let [nominal, next] = [done - 1, done].map(|i| kernel.edge(i));
             self.adaptation.end_iteration(nominal, next, done);
-            locked(&context.counters.hints).blur = self.adaptation.blur();
+            // iterations that do not filter add no blur to the picture
+            let share = f64::from(self.filtered) / f64::from(done);
+            locked(&context.counters.hints).blur = self.adaptation.blur().map(|b| b * share * share);
         }
         self.glances.end_iteration(done, rays);
         costs.stage("adaptation", 0);
@@ -200,10 +224,43 @@ impl Learnt {
         }
         if lessons.compares {
             let departure = Departure { deviation: lessons.deviation, before: context.completed };
-            self.economy.judge(lessons.index, departure, context.world.has_hidden_light());
-            let left_out = self.economy.left_out();
-            *locked(&context.counters.left_out) = left_out;
+            let must = Must {
+                have_light_paths: context.world.has_hidden_light(),
+                filter: lessons.techniques.is_for_comparison(),
+            };
+            match lessons.weighs_filter {
+                true => {
+                    let work = Work { rays, ..lessons.work };
+                    let hints = *locked(&context.counters.hints);
+                    let error = context.film.estimated_error(hints).filter(|e| e.noise > 0.0);
+                    let over_noise = error.map_or(1.0, |e| e.total() / e.noise);
+                    self.economy.judge_filter(departure, lessons.own_deviation, over_noise, work);
+                }
+                false => self.economy.judge(lessons.index, departure, must),
+            }
+            *locked(&context.counters.left_out) = self.economy.left_out();
         }
+    }
+
+    /// The picture before an iteration that traces paths, if it will be compared: band by band.
+    pub fn before_paths(&self, context: &Context, index: u32) -> Option<Vec<Shown>> {
+        let of_band = |(place, _): &(Rect, Shown)| Shown::of(context.film, *place);
+        if self.economy.compares(index) { self.yardsticks.iter().map(of_band).collect() } else { None }
+    }
+
+    /// Ends an iteration that traced paths, all of which are in the film.
+    pub fn end_paths(&mut self, context: &Context, before: Option<Vec<Shown>>) {
+        let share = f64::from(self.filtered) / f64::from(context.completed + 1);
+        locked(&context.counters.hints).blur = self.adaptation.blur().map(|b| b * share * share);
+        let Some(before) = before else { return };
+        let of_band = |((place, yardstick), before): (&(Rect, Shown), Shown)| {
+            let after = Shown::of(context.film, *place)?;
+            Some(yardstick.deviation(&before.latest(&after, context.completed)))
+        };
+        let found = self.yardsticks.iter().zip(before).map(of_band).sum::<Option<f64>>();
+        let departure = Departure { deviation: found.unwrap_or(f64::NAN), before: context.completed };
+        self.economy.judge_paths(departure);
+        *locked(&context.counters.left_out) = self.economy.left_out();
     }
 }
 

@@ -3,6 +3,7 @@
 mod band;
 mod learning;
 
+use super::path::Path;
 use super::{Context, Integrator, IterationEnd, StageCosts};
 use crate::film::Rect;
 use crate::transport::camera::Primary;
@@ -39,6 +40,15 @@ impl Integrator for Segment {
         let stopped = || context.stop.is_raised();
         let cut = Cut(&stopped);
         let mut costs = StageCosts::new(context.counters);
+        if !self.learnt.filters(context, &self.techniques, index) {
+            let before = self.learnt.before_paths(context, index);
+            let end = Path.iterate(context, index);
+            costs.stage("path tracing", 0);
+            if end == IterationEnd::Complete {
+                self.learnt.end_paths(context, before);
+            }
+            return end;
+        }
         let is_complete = self.all_bands(context, index, &cut, &mut costs);
         if is_complete { IterationEnd::Complete } else { IterationEnd::CutShort }
     }

@@ -60,11 +60,15 @@ fn what_only_light_paths_find_keeps_them() {
     assert_eq!(of_row(camera(), [(0.0, 1.0)].into_iter()), [0.0; SHARES.len()]);
 }
 
+fn judge(economy: &mut Economy, index: u32, departure: Departure, have_light_paths: bool) {
+    economy.judge(index, departure, Must { have_light_paths, filter: true });
+}
+
 /// After an iteration with all light paths that left it open whether they pay. `some`: as in [`Economy::judge`].
 fn on_trial(some: bool) -> Economy {
     let mut economy =
         Economy { errors: [1.2, 1.15, 1.1, 1.0], costs: [5.0, 5.6, 7.0, 10.0], ..Economy::default() };
-    economy.judge(3, Departure { deviation: 2.0, before: 3 }, some);
+    judge(&mut economy, 3, Departure { deviation: 2.0, before: 3 }, some);
     economy
 }
 
@@ -73,11 +77,11 @@ fn what_is_open_is_tried_once() {
     let mut economy = on_trial(false);
     assert!(economy.compares(4) && economy.light_paths(5000.0, 4) == 0.0);
     // variance with all: 4 - 4/4 = 3, without: 5.5 - 4/4 = 4.5, at half the cost
-    economy.judge(4, Departure { deviation: 5.5f64.sqrt(), before: 3 }, false);
+    judge(&mut economy, 4, Departure { deviation: 5.5f64.sqrt(), before: 3 }, false);
     assert!(!economy.compares(5) && economy.light_paths(5000.0, 5) == 0.0);
     // and where the pictures are much noisier, all stay: 6.5 - 4/4 = 5.5
     let mut economy = on_trial(false);
-    economy.judge(4, Departure { deviation: 6.5f64.sqrt(), before: 3 }, false);
+    judge(&mut economy, 4, Departure { deviation: 6.5f64.sqrt(), before: 3 }, false);
     assert_eq!(economy.light_paths(5000.0, 5), 5000.0);
 }
 
@@ -85,7 +89,7 @@ fn what_is_open_is_tried_once() {
 fn a_hidden_light_keeps_a_sixteenth_at_least() {
     let mut economy = on_trial(true);
     assert_eq!(economy.light_paths(5000.0, 4), 313.0);
-    economy.judge(4, Departure { deviation: 4.0f64.sqrt(), before: 3 }, true);
+    judge(&mut economy, 4, Departure { deviation: 4.0f64.sqrt(), before: 3 }, true);
     assert_eq!(economy.light_paths(5000.0, 5), 313.0);
     assert_eq!(economy.light_paths(500.0, 5), FEWEST);
     assert_eq!(economy.light_paths(5.0, 5), 5.0);
@@ -95,7 +99,7 @@ fn a_hidden_light_keeps_a_sixteenth_at_least() {
 fn nothing_is_tried_where_there_is_nothing_to_compare() {
     let mut economy =
         Economy { errors: [1.2, 1.15, 1.1, 1.0], costs: [5.0, 5.6, 7.0, 10.0], ..Economy::default() };
-    economy.judge(0, Departure { deviation: 0.0, before: 0 }, false);
+    judge(&mut economy, 0, Departure { deviation: 0.0, before: 0 }, false);
     assert!(!economy.compares(1) && economy.light_paths(5000.0, 1) == 5000.0);
 }
 
