@@ -28,11 +28,13 @@ class FromFiles:
     """Pixels as Blender's own images have them: (height, width, 4) float32, row 0 on top.
 
     Those of files with bytes are encoded, by 255, and not multiplied by their alpha; others are
-    linear and are. `counts`: how many tiles stand side by side and above one another.
+    linear and are. `counts`: how many tiles stand side by side and above one another; `reduction`:
+    what their resolution was divided by.
     """
 
     values: np.ndarray
     counts: tuple[int, int] = (1, 1)
+    reduction: int = 1
 
 
 def read_frame(image: bpy.types.Image, user: bpy.types.ImageUser) -> FromFiles:
@@ -48,15 +50,15 @@ def read_frame(image: bpy.types.Image, user: bpy.types.ImageUser) -> FromFiles:
 def read_tiles(image: bpy.types.Image) -> FromFiles:
     """All tiles of an image in one picture, black where there is none."""
     with _modules() as (images, tiles), tempfile.TemporaryDirectory() as unpacked:
-        paths = {number: str(path) for number, path in _tile_files(image, Path(unpacked))}
+        paths = {number: str(path) for number, path in _tile_files(tiles, image, Path(unpacked))}
         try:
             tiled = tiles.join(paths)
         except images.ImageError as error:
             raise UnreadableError(str(error)) from error
-    return FromFiles(_as_blenders(tiled.picture, image), tiled.counts)
+    return FromFiles(_as_blenders(tiled.picture, image), tiled.counts, tiled.reduction)
 
 
-def _tile_files(image: bpy.types.Image, unpacked: Path) -> Iterator[tuple[int, Path]]:
+def _tile_files(tiles: Any, image: bpy.types.Image, unpacked: Path) -> Iterator[tuple[int, Path]]:
     for packed in image.packed_files:
         path = unpacked / f"{packed.tile_number}{Path(packed.filepath).suffix}"
         path.write_bytes(packed.packed_file.data)
@@ -65,8 +67,8 @@ def _tile_files(image: bpy.types.Image, unpacked: Path) -> Iterator[tuple[int, P
         return
     pattern = bpy.path.abspath(image.filepath, library=image.library)
     for tile in image.tiles:
-        row, column = divmod(tile.number - 1001, 10)
-        name = pattern.replace("<UDIM>", str(tile.number))
+        column, row = tiles.place(tile.number)
+        name = pattern.replace(tiles.MARK, str(tile.number))
         path = Path(name.replace(_BY_COLUMN_AND_ROW, f"u{column + 1}_v{row + 1}"))
         if path.is_file():
             yield tile.number, path
@@ -102,11 +104,10 @@ def _modules() -> Iterator[tuple[Any, Any]]:
     """The engine's readers, with Blender's OpenImageIO where Python does not find another."""
     version = f"python{sysconfig.get_python_version()}"
     bundled = Path(bpy.utils.resource_path("LOCAL"), "python", "lib", version, "site-packages")
-    added = str(bundled)
-    sys.path.append(added)
+    sys.path.append(str(bundled))
     try:
         yield tuple(importlib.import_module(f"segue.{name}") for name in ("images", "tiles"))
     except ImportError as error:
         raise UnreadableError(str(error)) from error
     finally:
-        sys.path.remove(added)
+        sys.path.remove(str(bundled))

@@ -85,20 +85,26 @@ def _from_files(
     image: bpy.types.Image, user: bpy.types.ImageUser, log: ExportLog
 ) -> FromFiles | None:
     """The pixels of what has several files; None for all else, and where they cannot be read."""
-    kind, instead = {
-        "TILED": ("its UDIM tiles", "the first tile is used everywhere"),
-        "SEQUENCE": ("the frame of its sequence", "the frame now loaded is used"),
-        "MOVIE": ("frames of movies", "the frame now loaded is used"),
-    }.get(image.source, ("", ""))
-    try:
-        if image.source == "TILED":
-            return read_tiles(image)
-        if image.source == "SEQUENCE":
+    name = f"Image '{image.name}'"
+    if image.source == "TILED":
+        try:
+            found = read_tiles(image)
+        except UnreadableError as reason:
+            instead = "the first tile is used everywhere"
+            log.warn(f"{name}: its UDIM tiles cannot be read ({reason}), {instead}")
+            return None
+        if found.reduction > 1:
+            instead = f"their resolution is divided by {found.reduction}"
+            log.warn(f"{name}: its UDIM tiles take too much memory, {instead}")
+        return found
+    instead = "the frame now loaded is used"
+    if image.source == "SEQUENCE":
+        try:
             return read_frame(image, user)
-        if kind:
-            log.warn(f"Image '{image.name}': {kind} are not supported, {instead}")
-    except UnreadableError as reason:
-        log.warn(f"Image '{image.name}': {kind} cannot be read ({reason}), {instead}")
+        except UnreadableError as reason:
+            log.warn(f"{name}: the frame of its sequence cannot be read ({reason}), {instead}")
+    elif image.source == "MOVIE":
+        log.warn(f"{name}: frames of movies are not supported, {instead}")
     return None
 
 

@@ -112,11 +112,11 @@ def resized(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
         return pixels
     oiio = _oiio()
     channels = pixels.shape[2]
-    smaller = oiio.ImageBufAlgo.resize(
+    result = oiio.ImageBufAlgo.resize(
         oiio.ImageBuf(np.ascontiguousarray(pixels)),
         roi=oiio.ROI(0, width, 0, height, 0, 1, 0, channels),
     )
-    return np.asarray(smaller.get_pixels(str(pixels.dtype).replace("float16", "half"))).reshape(
+    return np.asarray(result.get_pixels(str(pixels.dtype).replace("float16", "half"))).reshape(
         height, width, channels
     )
 

@@ -36,6 +36,12 @@ class Tiled:
     reduction: int
 
 
+def place(number: int) -> tuple[int, int]:
+    """Column and row of a tile, from 0."""
+    row, column = divmod(number - FIRST, _ROW)
+    return column, row
+
+
 def join(paths: Mapping[int, str], most_bytes: int = _MOST_BYTES) -> Tiled:
     """Reads the files of tiles, by their numbers, and joins them at the size of the largest.
 
@@ -49,9 +55,8 @@ def join(paths: Mapping[int, str], most_bytes: int = _MOST_BYTES) -> Tiled:
     if len(kinds) > 1:
         raise ImageError("its tiles differ in their channels or in their pixel type")
     ((channels, dtype),) = kinds
-    places = {number: divmod(number - FIRST, _ROW) for number in pictures}
-    rows = 1 + max(row for row, _ in places.values())
-    columns = 1 + max(column for _, column in places.values())
+    places = {number: place(number) for number in pictures}
+    columns, rows = (1 + max(along) for along in zip(*places.values(), strict=True))
     height = max(p.pixels.shape[0] for p in pictures.values())
     width = max(p.pixels.shape[1] for p in pictures.values())
     reduction = 1
@@ -62,7 +67,7 @@ def join(paths: Mapping[int, str], most_bytes: int = _MOST_BYTES) -> Tiled:
         height, width, reduction = height // 2, width // 2, 2 * reduction
     joined = np.zeros((rows * height, columns * width, channels), dtype)
     for number, picture in pictures.items():
-        row, column = places[number]
+        column, row = places[number]
         top, left = (rows - 1 - row) * height, column * width
         joined[top : top + height, left : left + width] = resized(picture.pixels, width, height)
     return Tiled(Picture(joined, ""), (columns, rows), reduction)

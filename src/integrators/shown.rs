@@ -17,8 +17,7 @@ impl Shown {
     /// Of a band.
     pub fn of(film: &Film, band: Rect) -> Option<Self> {
         let shown = film.read_pass(Pass::Combined, band).ok()?;
-        let luminances = shown.chunks_exact(4).map(|c| luminance(Vec3::new(c[0], c[1], c[2])).max(0.0));
-        Some(Self(luminances.collect()))
+        Some(Self::of_samples(shown.chunks_exact(4).map(|c| Vec3::new(c[0], c[1], c[2]))))
     }
 
     /// Of one sample of every pixel.

@@ -1,7 +1,7 @@
 //! Surfaces that materials move: displaced meshes instead of those that were given. Vertices move along their normals, so a
 //! mesh must be fine enough for what is to be seen of it.
 
-use super::surface::{normal_matrix, normalize_any};
+use super::surface::{face_normal, normal_matrix, normalize_any};
 use super::texture::{MeshPoint, TextureSet};
 use crate::scene::material::Displacement;
 use crate::scene::mesh::Attribute;
@@ -92,12 +92,6 @@ fn displace(scene: &Scene, textures: &TextureSet, group: &InstanceGroup, instanc
     let keeps = |triangle: usize| displacement(triangle).is_some_and(|d| d.keeps_normals);
     result.normals = new_normals(mesh, &given, &result.positions, keeps);
     (result, bad)
-}
-
-/// The normal of a triangle; zero if it has none.
-fn face_normal(positions: &[Vec3], vertices: [u32; 3]) -> Vec3 {
-    let [a, b, c] = vertices.map(|v| positions[v as usize]);
-    normalize_any((b - a).cross(c - a))
 }
 
 /// Shading normals at the corners of a triangle.

@@ -1,6 +1,6 @@
 //! What the geometry of a surface has for textures: where a point is, and how it is turned.
 
-use super::surface::{normal_matrix, normalize_any};
+use super::surface::{face_normal, normal_matrix, normalize_any, on_side_of};
 use super::texture::{MeshPoint, interpolate};
 use crate::scene::Scene;
 use crate::scene::texture::{GeometryTexture, Quantity, Space};
@@ -15,9 +15,10 @@ pub(super) fn geometry(scene: &Scene, t: &GeometryTexture, at: &MeshPoint) -> Ve
     };
     let vector = match t.of {
         Quantity::Normal => turned(own_normal(scene, at)),
-        Quantity::FaceNormal => turned(face_normal(scene, at) * 1f32.copysign(at.facing)),
+        Quantity::FaceNormal => turned(own_face_normal(scene, at) * 1f32.copysign(at.facing)),
         Quantity::Position => {
-            let [a, b, c] = corners(scene, at);
+            let mesh = &scene.meshes[at.mesh as usize];
+            let [a, b, c] = mesh.triangles[at.triangle as usize].map(|i| mesh.positions[i as usize]);
             let own = a + (b - a) * at.barycentrics.x + (c - a) * at.barycentrics.y;
             match t.space {
                 Space::Object => own,
@@ -32,22 +33,18 @@ pub(super) fn geometry(scene: &Scene, t: &GeometryTexture, at: &MeshPoint) -> Ve
 /// Unit shading normal of the mesh in its own space, on the side that is seen.
 pub(super) fn own_normal(scene: &Scene, at: &MeshPoint) -> Vec3 {
     let mesh = &scene.meshes[at.mesh as usize];
-    let face = face_normal(scene, at);
-    let smooth = mesh.normals.as_ref().map_or(face, |normals| normalize_any(interpolate(normals, mesh, at)));
-    // no normal there (zero, not finite): the face's
-    let front = if smooth.length_squared() > 0.5 { smooth * 1f32.copysign(smooth.dot(face)) } else { face };
+    let face = own_face_normal(scene, at);
+    let front = mesh
+        .normals
+        .as_ref()
+        .map_or(face, |normals| on_side_of(face, normalize_any(interpolate(normals, mesh, at))));
     front * 1f32.copysign(at.facing)
 }
 
 /// Unit normal of the triangle in the mesh's space, out of its front.
-fn face_normal(scene: &Scene, at: &MeshPoint) -> Vec3 {
-    let [a, b, c] = corners(scene, at);
-    normalize_any((b - a).cross(c - a))
-}
-
-fn corners(scene: &Scene, at: &MeshPoint) -> [Vec3; 3] {
+fn own_face_normal(scene: &Scene, at: &MeshPoint) -> Vec3 {
     let mesh = &scene.meshes[at.mesh as usize];
-    mesh.triangles[at.triangle as usize].map(|i| mesh.positions[i as usize])
+    face_normal(&mesh.positions, mesh.triangles[at.triangle as usize])
 }
 
 #[cfg(test)]

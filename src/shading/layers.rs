@@ -56,7 +56,7 @@ impl World {
             depth: hit.t,
             position,
             normal,
-            ns: shading_normal(&self.scene, hit.instance, &at, normal),
+            ns: shading_normal(&self.scene, &at, normal),
             class: self.class(self.scene.material_index(hit.instance, hit.triangle)),
         }
     }

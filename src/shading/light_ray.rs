@@ -51,10 +51,10 @@ impl World {
             let mesh = self.scene.group(instance).mesh;
             let barycentrics = if self.scene.is_mirrored(instance) { b.yx() } else { b };
             let at = MeshPoint::new(instance, mesh, triangle, barycentrics);
-            let origin = place(&self.scene, &self.accel, instance, &at);
+            let origin = place(&self.scene, &self.accel, &at);
             (ray, point) = (origin.spawn(s.direction), origin.position);
             if let Emission::Extended { radiance, .. } = &mut emission {
-                *radiance = self.visible_emission(instance, &at, origin.normal, s.direction);
+                *radiance = self.visible_emission(&at, origin.normal, s.direction);
             }
         }
         let flux = emission.flux() / factor;

@@ -36,11 +36,11 @@ pub struct Address {
 }
 
 /// A point of a mesh in the world, as the ray tracer sees it.
-pub fn place(scene: &Scene, accel: &Accel, instance: u32, at: &MeshPoint) -> Place {
+pub fn place(scene: &Scene, accel: &Accel, at: &MeshPoint) -> Place {
     let mesh = &scene.meshes[at.mesh as usize];
     let corners = mesh.triangles[at.triangle as usize].map(|i| mesh.positions[i as usize]);
-    let to_world = &scene.instances[instance as usize].to_world;
-    accel.surface_point(instance, corners, to_world, at.barycentrics.to_array())
+    let to_world = &scene.instances[at.instance as usize].to_world;
+    accel.surface_point(at.instance, corners, to_world, at.barycentrics.to_array())
 }
 
 /// Object-to-world map of normals, up to a positive factor: the cofactor matrix, turned so that a
@@ -57,14 +57,26 @@ pub fn normalize_any(v: Vec3) -> Vec3 {
     if scale > 0.0 && scale.is_finite() { (v / scale).normalize() } else { Vec3::ZERO }
 }
 
+/// Unit normal of a triangle of these points, out of its front; zero if it has none.
+pub fn face_normal(points: &[Vec3], vertices: [u32; 3]) -> Vec3 {
+    let [a, b, c] = vertices.map(|v| points[v as usize]);
+    normalize_any((b - a).cross(c - a))
+}
+
+/// A unit shading normal on the side of the geometric one, or that one where it is none (zero).
+pub fn on_side_of(geometric: Vec3, shading: Vec3) -> Vec3 {
+    match shading.length_squared() > 0.5 {
+        true => shading * 1f32.copysign(shading.dot(geometric)),
+        false => geometric,
+    }
+}
+
 /// Unit shading normal at a point of an instance's mesh, on the side of the geometric one.
-pub fn shading_normal(scene: &Scene, instance: u32, at: &MeshPoint, geometric: Vec3) -> Vec3 {
+pub fn shading_normal(scene: &Scene, at: &MeshPoint, geometric: Vec3) -> Vec3 {
     let mesh = &scene.meshes[at.mesh as usize];
     let Some(normals) = &mesh.normals else { return geometric };
-    let matrix = Mat3::from(scene.instances[instance as usize].to_world.matrix3);
-    let n = normalize_any(normal_matrix(matrix) * interpolate(normals, mesh, at));
-    // no normal there (zero, not finite): the geometric one
-    if n.length_squared() > 0.5 { n * 1f32.copysign(n.dot(geometric)) } else { geometric }
+    let matrix = Mat3::from(scene.instances[at.instance as usize].to_world.matrix3);
+    on_side_of(geometric, normalize_any(normal_matrix(matrix) * interpolate(normals, mesh, at)))
 }
 
 /// Cosine between a direction and the shading normal, negative on the back of the surface.
@@ -82,10 +94,10 @@ impl SurfacePoint {
     pub fn new(scene: &Scene, accel: &Accel, hit: &Hit) -> Self {
         let group = scene.group(hit.instance);
         let at = MeshPoint::new(hit.instance, group.mesh, hit.triangle, Vec2::new(hit.u, hit.v));
-        let place = place(scene, accel, hit.instance, &at);
+        let place = place(scene, accel, &at);
         Self {
             place,
-            ns: shading_normal(scene, hit.instance, &at, place.normal),
+            ns: shading_normal(scene, &at, place.normal),
             instance: hit.instance,
             material: scene.material_index(hit.instance, hit.triangle),
             at,

@@ -434,8 +434,8 @@ impl World {
                             let mesh = self.scene.group(instance).mesh;
                             let barycentrics = if self.scene.is_mirrored(instance) { b.yx() } else { b };
                             let at = MeshPoint::new(instance, mesh, triangle, barycentrics);
-                            let place = place(&self.scene, &self.accel, instance, &at);
-                            let radiance = self.visible_emission(instance, &at, place.normal, -s.direction);
+                            let place = place(&self.scene, &self.accel, &at);
+                            let radiance = self.visible_emission(&at, place.normal, -s.direction);
                             (radiance, Target::Surface(place))
                         }
                     };
@@ -459,9 +459,9 @@ impl World {
     }
 
     /// Emission of a triangle of this geometric normal towards `wo`, as much of it as there is.
-    pub(super) fn visible_emission(&self, instance: u32, at: &MeshPoint, normal: Vec3, wo: Vec3) -> Vec3 {
-        let material = self.scene.material_index(instance, at.triangle);
-        let facing = || facing(shading_normal(&self.scene, instance, at, normal), normal, wo);
+    pub(super) fn visible_emission(&self, at: &MeshPoint, normal: Vec3, wo: Vec3) -> Vec3 {
+        let material = self.scene.material_index(at.instance, at.triangle);
+        let facing = || facing(shading_normal(&self.scene, at, normal), normal, wo);
         let emission = self.materials.emission(material, at, facing);
         match self.needs.transparency && self.materials.may_be_transparent(material) {
             true => emission * self.materials.opacity(material, at),

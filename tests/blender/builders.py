@@ -144,6 +144,13 @@ def image(
     return data
 
 
+def patches(side: int, seed: int = 2) -> np.ndarray:
+    """Opaque pixels of random colours, (side, side, 4)."""
+    pixels = np.ones((side, side, 4), np.float32)
+    pixels[..., :3] = np.random.default_rng(seed).random((side, side, 3))
+    return pixels
+
+
 class _Messages(logging.Handler):
     """Keeps what the add-on warns about."""
 

@@ -262,15 +262,7 @@ class Textures:
         if key not in self._images:
             try:
                 if found:
-                    tiled = tiles.join(found)
-                    if tiled.reduction > 1:
-                        self._report.warning(
-                            attribute.GetPrim(),
-                            f"the tiles of {asset.path} take too much memory",
-                            f"their resolution is divided by {tiled.reduction}",
-                        )
-                    added = self._add_image(asset.path, tiled.picture, space, mask)
-                    self._images[key] = replace(added, tiles=tiled.counts)
+                    self._images[key] = self._add_tiles(attribute, asset, found, space, mask)
                 else:
                     self._images[key] = self._add_image(path, images.read(path), space, mask)
             except images.ImageError as error:
@@ -287,6 +279,24 @@ class Textures:
         return _Loaded(
             number, picture.has_alpha, picture.is_8_bit, picture.pixels.shape[2], picture.wrap
         )
+
+    def _add_tiles(
+        self,
+        attribute: Usd.Attribute,
+        asset: Sdf.AssetPath,
+        found: dict[int, str],
+        space: str,
+        mask: Any,
+    ) -> _Loaded:
+        tiled = tiles.join(found)
+        if tiled.reduction > 1:
+            self._report.warning(
+                attribute.GetPrim(),
+                f"the tiles of {asset.path} take too much memory",
+                f"their resolution is divided by {tiled.reduction}",
+            )
+        loaded = self._add_image(asset.path, tiled.picture, space, mask)
+        return replace(loaded, tiles=tiled.counts)
 
     def _tiles(self, attribute: Usd.Attribute, asset: Sdf.AssetPath) -> dict[int, str]:
         """The files of a UDIM texture by the numbers of their tiles."""

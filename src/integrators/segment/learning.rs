@@ -145,12 +145,13 @@ impl Learnt {
             if lessons.looks {
                 self.yardsticks.push((place, before));
             }
-            lessons.deviation += self.yardsticks.get(k).map_or(0.0, |(_, y)| y.deviation(&latest));
-            if lessons.weighs_filter {
-                let own = band.primaries.iter().map(|p| p.light + p.weight * p.unfiltered);
-                let own = Shown::of_samples(own);
-                lessons.own_deviation += self.yardsticks.get(k).map_or(0.0, |(_, y)| y.deviation(&own));
-                lessons.work += band.work();
+            if let Some((_, yardstick)) = self.yardsticks.get(k) {
+                lessons.deviation += yardstick.deviation(&latest);
+                if lessons.weighs_filter {
+                    let own = band.primaries.iter().map(|p| p.light + p.weight * p.unfiltered);
+                    lessons.own_deviation += yardstick.deviation(&Shown::of_samples(own));
+                    lessons.work += band.work();
+                }
             }
         }
         if lessons.guides || lessons.looks {
@@ -208,9 +209,7 @@ impl Learnt {
         if kernel.adapts() {
             let [nominal, next] = [done - 1, done].map(|i| kernel.edge(i));
             self.adaptation.end_iteration(nominal, next, done);
-            // iterations that do not filter add no blur to the picture
-            let share = f64::from(self.filtered) / f64::from(done);
-            locked(&context.counters.hints).blur = self.adaptation.blur().map(|b| b * share * share);
+            self.tell_blur(context);
         }
         self.glances.end_iteration(done, rays);
         costs.stage("adaptation", 0);
@@ -224,10 +223,6 @@ impl Learnt {
         }
         if lessons.compares {
             let departure = Departure { deviation: lessons.deviation, before: context.completed };
-            let must = Must {
-                have_light_paths: context.world.has_hidden_light(),
-                filter: lessons.techniques.is_for_comparison(),
-            };
             match lessons.weighs_filter {
                 true => {
                     let work = Work { rays, ..lessons.work };
@@ -236,10 +231,22 @@ impl Learnt {
                     let over_noise = error.map_or(1.0, |e| e.total() / e.noise);
                     self.economy.judge_filter(departure, lessons.own_deviation, over_noise, work);
                 }
-                false => self.economy.judge(lessons.index, departure, must),
+                false => {
+                    let must = Must {
+                        have_light_paths: context.world.has_hidden_light(),
+                        filter: lessons.techniques.is_for_comparison(),
+                    };
+                    self.economy.judge(lessons.index, departure, must);
+                }
             }
             *locked(&context.counters.left_out) = self.economy.left_out();
         }
+    }
+
+    /// Tells how much the kernels have blurred the picture, an iteration more included: those that do not filter add none.
+    fn tell_blur(&self, context: &Context) {
+        let share = f64::from(self.filtered) / f64::from(context.completed + 1);
+        locked(&context.counters.hints).blur = self.adaptation.blur().map(|blur| blur * share * share);
     }
 
     /// The picture before an iteration that traces paths, if it will be compared: band by band.
@@ -250,8 +257,7 @@ impl Learnt {
 
     /// Ends an iteration that traced paths, all of which are in the film.
     pub fn end_paths(&mut self, context: &Context, before: Option<Vec<Shown>>) {
-        let share = f64::from(self.filtered) / f64::from(context.completed + 1);
-        locked(&context.counters.hints).blur = self.adaptation.blur().map(|b| b * share * share);
+        self.tell_blur(context);
         let Some(before) = before else { return };
         let of_band = |((place, yardstick), before): (&(Rect, Shown), Shown)| {
             let after = Shown::of(context.film, *place)?;

@@ -387,8 +387,7 @@ def _check_floor(*what: object) -> None:
 
 def case_checkers_and_pictures_by_other_coordinates() -> None:
     """On the floor, and pictures by the object's own coordinates on the ball as well."""
-    pixels = np.ones((6, 6, 4), np.float32)
-    pixels[..., :3] = np.random.default_rng(2).random((6, 6, 3))
+    pixels = builders.patches(6)
     for space, kind in (
         *((space, "TexChecker") for space in ("", "UV", "Object", "Generated")),
         *((space, "TexImage") for space in ("Object", "Generated")),
@@ -407,8 +406,7 @@ def case_checkers_and_pictures_by_other_coordinates() -> None:
 def case_pictures_around_things() -> None:
     """From the sides of a box, sharp and blended, around a sphere and a tube; on floor and ball."""
     # with so many rows no edge is where a flat floor looks its one colour up
-    pixels = np.ones((7, 7, 4), np.float32)
-    pixels[..., :3] = np.random.default_rng(2).random((7, 7, 3))
+    pixels = builders.patches(7)
     for projection, blend, space in (
         ("BOX", 0.0, "Object"),
         ("BOX", 0.6, "Generated"),
@@ -637,8 +635,7 @@ def case_objects_with_colours_of_their_own() -> None:
 
 def case_coordinates_that_are_computed() -> None:
     """Bent ones for pictures and patterns, and single ones as numbers."""
-    pixels = np.ones((8, 8, 4), np.float32)
-    pixels[..., :3] = np.random.default_rng(2).random((8, 8, 3))
+    pixels = builders.patches(8)
     for kind, space in (
         ("TexImage", "UV"),
         ("TexNoise", "Object"),

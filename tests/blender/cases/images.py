@@ -13,9 +13,7 @@ from harness import SkipCaseError
 
 def _write(name: str, seed: int) -> None:
     """A picture of random patches."""
-    pixels = np.ones((4, 4, 4), np.float32)
-    pixels[..., :3] = np.random.default_rng(seed).random((4, 4, 3))
-    image = builders.image("Patches", pixels.repeat(8, 0).repeat(8, 1))
+    image = builders.image("Patches", builders.patches(4, seed).repeat(8, 0).repeat(8, 1))
     image.filepath_raw, image.file_format = str(builders.OUTPUT / name), "PNG"
     image.save()
     bpy.data.images.remove(image)
