@@ -1,8 +1,8 @@
 """docs/agreement.md: whether the integrators agree, by the means of small pictures of the gallery and of the shared scenes.
 
 The shared scenes are those of SEGUE_SHARED, or of ../shared beside the checkout; without them it says so and takes the gallery
-alone. Every scene, method, kernel and seed has SEGUE_SECONDS of processor time. What was measured is kept in results/agreement
-until that is deleted. Fails if anything differs. Run: .venv/bin/python benches/agreement.py [SCENE ...]
+alone. A method and kernel has up to SEGUE_SECONDS of processor time for each seed of a scene. What was measured is kept in
+results/agreement until that is deleted. Fails if anything differs. Run: .venv/bin/python benches/agreement.py [SCENE ...]
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from segue import Render, Scene, usd
 ROOT = Path(__file__).parent.parent
 SHARED = Path(os.environ.get("SEGUE_SHARED", ROOT.parent / "shared")) / "peers" / "usd"
 KEPT = ROOT / "results" / "agreement"
-SECONDS = float(os.environ.get("SEGUE_SECONDS", "2"))
+#: Processor seconds of a seed: at least, before a row is given up, and at most.
+LEAST, ENOUGH, MOST = 0.5, 2.0, float(os.environ.get("SEGUE_SECONDS", "20"))
 SEEDS, BLOCK = 6, 24
 #: Pictures of the gallery, and of the shared scenes, which are square.
 WIDE, SQUARE = (288, 162), (192, 192)
@@ -40,6 +41,8 @@ ROWS = [(m, None) for m in UNBIASED] + [(m, k) for m in BIASED for k in KERNELS]
 STAND_IN = ROWS.index(("vcm", KERNELS[-1]))
 #: Largest relative difference of means that agree, and largest standard error that tells.
 LIMIT = 0.005
+#: Relative standard error at which a row has had enough time: with that of what it is compared with it stays below the limit.
+AIM = 0.7 * LIMIT
 #: Probability that a table tells of a difference where there is none.
 FALSE_ALARM = 0.01
 #: A standard error is at least so many times the largest contribution.
@@ -55,7 +58,7 @@ CANNOT, CHANCE, SHRINKS = "cannot find", "by chance", "shrinks"
 HEAD = f"""# Do the methods agree?
 
 Mean luminance of pictures of {WIDE[0]} × {WIDE[1]} (gallery) and {SQUARE[0]} × {SQUARE[1]} pixels (scenes shared with other renderers), by `benches/agreement.py`: {SEEDS} seeds for every method,
-{{seconds:g}} s of processor time each, all with random numbers of their own. Lights that are seen straight are left out (the pass `Emission`): all methods find them alike, and the noise
+all with random numbers of their own. A seed has {LEAST:g} s of processor time, twice that, and so on, until its method's standard error is {AIM:.2%}; at most {MOST:g} s, and no more than {ENOUGH:g} s where these would not do by far. Lights that are seen straight are left out (the pass `Emission`): all methods find them alike, and the noise
 of a lamp's edge would hide the rest. *Clear* is the part of a picture that shows no mirror and no smooth glass, not even in a neighbouring pixel. There nobody sees a lamp by a rare
 reflection, which is as noisy for all methods, and light tracing is complete.
 
@@ -134,7 +137,7 @@ class Row:
     """What the pictures of all seeds tell, of either part, as shares of the mean luminance.
 
     Attributes:
-        budget: what was spent.
+        budget: what could be spent.
         sums: what every block brings, by part, seed and block.
         variance: of the blocks' means over the seeds if pixels are independent, by part and block.
         chunk: most that a pixel of a seed brings above its own mean, by part.
@@ -158,6 +161,15 @@ class Row:
         by_seeds = sums.std(axis=0, ddof=1) / SEEDS**0.5
         least = np.maximum(np.sqrt(variance), CHUNKS * self.chunk[part])
         return sums.mean(axis=0), np.maximum(by_seeds, least)
+
+    def gains_from_more(self, seconds: float) -> bool:
+        """Whether more than these seconds a seed bring a part's mean to the aim, or may do so for all that is known."""
+        for part in (ALL, CLEAR):
+            mean, error = self.estimate(part)
+            needed = seconds * (error / (AIM * mean)) ** 2 if mean > 0.0 else 0.0
+            if seconds < needed and (needed <= MOST or seconds < ENOUGH):
+                return True
+        return False
 
 
 def by_block(values: np.ndarray) -> list:
@@ -193,7 +205,7 @@ class Place:
         """A row from its file, or measured with seeds from this one on."""
         name = f"{self.name}-{method}" + (f"-{kernel:.2f}px" if kernel else "")
         file = KEPT / f"{name.replace('/', '-')}.json"
-        budget = [SECONDS, SEEDS, *self.size]
+        budget = [MOST, SEEDS, *self.size]
         if file.exists():
             row = Row(**json.loads(file.read_text()))
             if row.budget == budget:
@@ -201,13 +213,30 @@ class Place:
         settings = {"kernel": "fixed", "kernel_size": kernel} if kernel else {}
         settings |= {"integrator": method, "threads": 1, "resolution": self.size}
         # slices: a busy machine gives less processor time than its clock says
-        settings |= {"passes": ["Combined", "Emission"], "time": SECONDS / 4}
-        pictures = []
+        settings |= {"passes": ["Combined", "Emission"], "time": LEAST / 2}
         # for a seed all methods take the same camera samples: every row has seeds of its own
-        for k in range(SEEDS):
-            job = Render(self.scene, {**settings, "seed": seed + k})
-            while job.stats()["cpu_seconds"] < SECONDS:
-                job.run()
+        jobs = [
+            Render(self.scene, {**settings, "seed": seed + k}) for k in range(SEEDS)
+        ]
+        seconds, wanted = LEAST, True
+        while wanted:
+            for job in jobs:
+                while job.stats()["cpu_seconds"] < seconds:
+                    job.run()
+            row = Row(budget, *self.parts(jobs))
+            wanted = seconds < MOST and row.gains_from_more(seconds)
+            spent, seconds = seconds, min(2.0 * seconds, MOST)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.with_suffix(".unfinished").write_text(json.dumps(asdict(row)))
+        file.with_suffix(".unfinished").replace(file)
+        mean, error = row.estimate(ALL)
+        print(f"{name}: {mean:.5g} ± {error / mean:.2%}, {spent:g} s", flush=True)
+        return row
+
+    def parts(self, jobs: list[Render]) -> tuple[list, list, list]:
+        """Sums of blocks, their variances and the largest contribution, as `Row` has them."""
+        pictures = []
+        for job in jobs:
             straight = job.read_pass("Emission").astype(float)
             pictures.append(job.read_pass("Combined")[..., :3] - straight)
         masks = np.array([np.ones_like(self.clear), self.clear], float)
@@ -215,14 +244,7 @@ class Place:
         away = parts - parts.mean(axis=1, keepdims=True)
         variance = (away**2).sum(axis=1) / (SEEDS * (SEEDS - 1))
         chunk = (away.max(axis=(1, 2, 3)) / SEEDS).tolist()
-        row = Row(budget, by_block(parts), by_block(variance), chunk)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.with_suffix(".unfinished").write_text(json.dumps(asdict(row)))
-        file.with_suffix(".unfinished").replace(file)
-        mean, error = row.estimate(ALL)
-        samples = job.stats()["samples"]
-        print(f"{name}: {mean:.5g} ± {error:.2g}, {samples:.0f} samples", flush=True)
-        return row
+        return by_block(parts), by_block(variance), chunk
 
 
 @dataclass(frozen=True)
@@ -368,7 +390,7 @@ def main(names: list[str]) -> int:
     for place in places:
         shown = [ALL] if place.clear.all() or not place.clear.any() else [ALL, CLEAR]
         parts += [Part(place, part) for part in shown]
-    text = HEAD.format(seconds=SECONDS) + pairs(parts, said) + kernels(parts, said)
+    text = HEAD + pairs(parts, said) + kernels(parts, said)
     counts = ", ".join(f"{said[what]} × *{what}*" for what in sorted(said))
     text += f"\nIn all: {counts}.\n"
     print(text)

@@ -53,13 +53,20 @@ fn render_tile(context: &Context, index: u32, shared: &SharedTile) -> bool {
             complete = false;
             break;
         }
-        let (ray, sampler) = context.camera_sample(x, y, index);
-        let mut walk = PathWalk { context, sampler, rays: 0 };
-        tile.add(x, y, &walk.sample(&ray));
-        rays += walk.rays;
+        let (sample, taken) = sample(context, context.camera_sample(x, y, index));
+        tile.add(x, y, &sample);
+        rays += taken;
     }
     context.counters.rays.fetch_add(rays, Relaxed);
     complete
+}
+
+/// The path that begins with a camera ray, and the rays that it took.
+pub(super) fn sample(context: &Context, (ray, sampler): (CameraRay, Sampler)) -> (Sample, u64) {
+    let mut walk = PathWalk { context, sampler, rays: 0 };
+    let mut sample = Sample { alpha: 1.0, ..Sample::default() };
+    walk.trace(&ray, &mut sample);
+    (sample, walk.rays)
 }
 
 /// Where the last direction came from, for the weight of light that is hit by it.
@@ -89,13 +96,7 @@ impl PathWalk<'_, '_> {
         self.context.world
     }
 
-    /// One sample of the pixel that a camera ray goes through.
-    fn sample(&mut self, ray: &CameraRay) -> Sample {
-        let mut sample = Sample { alpha: 1.0, ..Sample::default() };
-        self.trace(ray, &mut sample);
-        sample
-    }
-
+    /// Adds the light of a path that begins with a camera ray.
     fn trace(&mut self, camera: &CameraRay, sample: &mut Sample) {
         let context = self.context;
         let world = context.world;

@@ -2,12 +2,44 @@
 
 use crate::film::{Film, Pass, Rect};
 use crate::math::luminance;
+use crate::math::sampler::hash_unit;
+use crate::transport::economy::Traced;
 use glam::Vec3;
 
 /// Of the picture's mean brightness, what is added to that of a pixel where shares of it are judged.
 const DARK: f32 = 0.1;
 /// Pixels whose deviations are judged together.
 const ROW: usize = 64;
+/// So many rows tell how noisy a picture is; of large pictures this share.
+const ENOUGH: usize = 64;
+const LEAST: f32 = 1.0 / 16.0;
+
+/// Which rows of pixels are compared: chosen at random, so many of them on average.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows {
+    share: f32,
+    seed: u32,
+}
+
+impl Rows {
+    /// All.
+    pub const ALL: Self = Self { share: 1.0, seed: 0 };
+
+    /// A part of the rows of a film, that is enough to tell.
+    pub fn some(pixels: usize, seed: u32) -> Self {
+        let share = (ENOUGH * ROW) as f32 / pixels as f32;
+        Self { share: share.clamp(LEAST, 1.0), seed }
+    }
+
+    fn count(self, row: usize) -> bool {
+        hash_unit(self.seed, row as u32) < self.share
+    }
+
+    /// Whether a pixel of a band counts, by its number.
+    pub fn have(self, pixel: usize) -> bool {
+        self.count(pixel / ROW)
+    }
+}
 
 /// Luminance of a band as it stands in the film.
 #[derive(Debug)]
@@ -40,11 +72,29 @@ impl Shown {
 
     /// How far a picture is from this one: relative deviations, squared over short rows of pixels and summed over
     /// these, so that a few bright specks do not decide.
-    pub fn deviation(&self, other: &Self) -> f64 {
-        let pixels = self.0.iter().zip(&other.0).zip(self.scales());
-        let squares: Vec<f64> = pixels.map(|((a, b), scale)| f64::from((b - a) / scale).powi(2)).collect();
-        let finite = |square: &&f64| square.is_finite();
-        squares.chunks(ROW).map(|row| row.iter().filter(finite).sum::<f64>().sqrt()).sum()
+    pub fn deviation(&self, other: &Self, rows: Rows) -> f64 {
+        let squares = self.squares(self.0.iter().zip(&other.0).map(|(a, b)| b - a), rows);
+        squares.iter().map(|row| row.iter().sum::<f64>().sqrt()).sum()
+    }
+
+    /// How far the mean of two independent pictures is from the truth, on average, relative to the brightness here.
+    pub fn noise_of_halves(&self, [a, b]: &[Self; 2], rows: Rows) -> Traced {
+        let squares = self.squares(a.0.iter().zip(&b.0).map(|(a, b)| 0.5 * (b - a)), rows);
+        let deviation = squares.iter().map(|row| row.iter().sum::<f64>().sqrt()).sum();
+        let mut sorted: Vec<f64> = squares.into_iter().flatten().collect();
+        sorted.sort_by(f64::total_cmp);
+        let (pixels, noise) = (sorted.len(), sorted.iter().sum());
+        let calm = sorted[..pixels - pixels / 100].iter().sum();
+        Traced { deviation, noise, calm, pixels, rays: 0 }
+    }
+
+    /// Squares of relative differences, row by row, as far as they are finite.
+    fn squares(&self, differences: impl Iterator<Item = f32>, rows: Rows) -> Vec<Vec<f64>> {
+        let relative = differences.zip(self.scales()).map(|(d, scale)| f64::from(d / scale));
+        let squares: Vec<f64> = relative.map(|d| d * d).collect();
+        let finite = |row: &[f64]| row.iter().copied().filter(|square| square.is_finite()).collect();
+        let counted = squares.chunks(ROW).enumerate().filter(|&(row, _)| rows.count(row));
+        counted.map(|(_, row)| finite(row)).collect()
     }
 }
 
@@ -61,6 +111,6 @@ mod tests {
         assert!(found.0.iter().zip(&latest.0).all(|(a, b)| (a - b).abs() < 1e-6));
         // two rows of 64 pixels, half of them 0.1 off and half 0.3, at a brightness of 1 + DARK
         let expected = 2.0 * (32.0f64 * (0.01 + 0.09)).sqrt() / 1.1;
-        assert!((mean.deviation(&found) - expected).abs() < 1e-4 * expected);
+        assert!((mean.deviation(&found, Rows::ALL) - expected).abs() < 1e-4 * expected);
     }
 }

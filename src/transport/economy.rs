@@ -26,7 +26,7 @@ use filter::FilterEconomy;
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub use filter::Work;
+pub use filter::{PATHS, Traced, Work};
 
 /// Numbers of light paths that are compared, as shares of all.
 const SHARES: [f32; 4] = [0.0, 1.0 / 16.0, 0.25, 1.0];
@@ -48,6 +48,8 @@ const PROVEN: f64 = 1.25;
 /// So many light paths at least, if any: those of a cluster would else be parts of one path, and what is estimated by
 /// one of them would depend on the density of the others (1 % dark with four).
 const FEWEST: f32 = 64.0;
+/// Where paths are traced and all is quiet, nobody looks before this iteration.
+const SETTLED: u32 = 255;
 /// Clusters that are looked at, about.
 const MOST: usize = 1 << 14;
 
@@ -130,23 +132,24 @@ struct Draws {
 
 impl Economy {
     /// Whether iteration `index` samples all light paths, to look what they bring.
-    pub fn looks(index: u32) -> bool {
-        (index + 1).is_power_of_two() && (index + 1).trailing_zeros().is_multiple_of(2)
+    pub fn looks(&self, index: u32) -> bool {
+        let is_due = (index + 1).is_power_of_two() && (index + 1).trailing_zeros().is_multiple_of(2);
+        is_due && (index >= SETTLED || !self.filter.is_settled())
     }
 
     /// Whether iteration `index` has to be compared to those before.
     pub fn compares(&self, index: u32) -> bool {
-        Self::looks(index) || self.trial.is_some() || self.filter.compares()
+        self.looks(index) || self.trial.is_some() || self.filter.looks()
     }
 
     /// Whether iteration `index` filters, and does not trace paths instead.
     pub fn filters(&self, index: u32) -> bool {
-        Self::looks(index) || self.filter.filters()
+        self.looks(index) || self.filter.filters()
     }
 
     /// How many of `all` light paths iteration `index` should sample.
     pub fn light_paths(&self, all: f32, index: u32) -> f32 {
-        let share = match (Self::looks(index), self.trial) {
+        let share = match (self.looks(index), self.trial) {
             (true, _) => 1.0,
             (false, Some(trial)) => SHARES[trial.share],
             (false, None) => self.share,
@@ -183,21 +186,21 @@ impl Economy {
         self.costs.iter_mut().zip(costs).for_each(|(sum, v)| *sum += v);
     }
 
-    /// Whether iteration `index` tells if filtering pays, if it filters.
+    /// Whether iteration `index` is to be compared with path tracing, to find out whether filtering pays.
     pub fn weighs_filter(&self, index: u32) -> bool {
-        self.filter.compares() && !Self::looks(index)
+        self.filter.looks() && !self.looks(index)
     }
 
-    /// Judges whether filtering pays, see [`FilterEconomy::judge_filtered`].
-    pub fn judge_filter(&mut self, departure: Departure, own: f64, error_over_noise: f64, work: Work) {
-        self.filter.judge_filtered(departure, own, error_over_noise, work);
+    /// Judges whether filtering pays, see [`FilterEconomy::judge`].
+    pub fn judge_filter(&mut self, filtered: Departure, traced: Traced, error_over_noise: f64, work: Work) {
+        self.filter.judge(filtered, traced, error_over_noise, work);
     }
 
     /// Judges how many light paths pay after iteration `index`, by what was seen in it.
     pub fn judge(&mut self, index: u32, departure: Departure, must: Must) {
         let (squared, before) = (departure.squared(), departure.before);
         let mut looked = before;
-        if Self::looks(index) {
+        if self.looks(index) {
             let [surely, perhaps] =
                 [UNTOLD, TOLD].map(|factor| self.best(factor, usize::from(must.have_light_paths)));
             let is_open = surely == ALL && perhaps != ALL && before > 0;
@@ -219,11 +222,6 @@ impl Economy {
             false if self.trial.is_none() => self.filter.begin(looked),
             false => {}
         }
-    }
-
-    /// Judges after an iteration that traced paths.
-    pub fn judge_paths(&mut self, departure: Departure) {
-        self.filter.judge_unfiltered(departure);
     }
 
     /// The share, from number `least` on, at which error times cost is least, if what fewer light paths add to the

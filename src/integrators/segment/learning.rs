@@ -3,17 +3,19 @@
 
 use super::band::Band;
 use crate::film::Rect;
-use crate::integrators::shown::Shown;
-use crate::integrators::{Context, StageCosts, locked};
+use crate::integrators::shown::{Rows, Shown};
+use crate::integrators::{Context, StageCosts, locked, path};
 use crate::math::sampler::hash;
 use crate::math::{LUMINANCE, luminance};
 use crate::transport::adaptation::{Adaptation, Look};
 use crate::transport::camera::Primary;
-use crate::transport::economy::{Departure, Economy, Must, Work};
+use crate::transport::economy::{Departure, Economy, Must, PATHS, Traced, Work};
 use crate::transport::glances::Glances;
 use crate::transport::guiding::{Guiding, Outcome, Start};
 use crate::transport::{Cut, Techniques};
 use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Keeps the random numbers of the grids that choose sizes apart from all others.
 const ADAPTATION_STREAM: u32 = 0xada9_0000;
@@ -51,9 +53,10 @@ pub(super) struct Lessons {
     bands: usize,
     /// How far its picture is from those before.
     deviation: f64,
-    /// Whether it tells if filtering pays; how far its camera paths by themselves are from those pictures.
+    /// Whether it tells if filtering pays, where it is compared with path tracing for that, and what that makes of it there.
     weighs_filter: bool,
-    own_deviation: f64,
+    rows: Rows,
+    traced: Traced,
     /// What it had to do.
     work: Work,
     /// Sum of what bands have beyond the camera's own paths.
@@ -83,7 +86,7 @@ impl Learnt {
     ) -> Lessons {
         let is_thrifty = is_thrifty(context, &techniques);
         let guides = techniques.emission_guiding && self.guiding.begin_iteration(arrived);
-        let looks = is_thrifty && Economy::looks(index);
+        let looks = is_thrifty && self.economy.looks(index);
         let compares = is_thrifty && self.economy.compares(index);
         if looks {
             self.yardsticks.clear();
@@ -92,6 +95,8 @@ impl Learnt {
             self.adaptation.begin(context.crop, context.completed + 1);
         }
         self.glances.begin(context.crop, context.world.needs().mirrors);
+        let weighs_filter = compares && self.economy.weighs_filter(index);
+        let some = || Rows::some(context.crop.area(), hash(context.seed, index));
         Lessons {
             techniques,
             index,
@@ -101,8 +106,9 @@ impl Learnt {
             light_paths,
             bands,
             deviation: 0.0,
-            weighs_filter: compares && self.economy.weighs_filter(index),
-            own_deviation: 0.0,
+            weighs_filter,
+            rows: if weighs_filter { some() } else { Rows::ALL },
+            traced: Traced::default(),
             work: Work::default(),
             beyond: 0.0,
         }
@@ -146,11 +152,11 @@ impl Learnt {
                 self.yardsticks.push((place, before));
             }
             if let Some((_, yardstick)) = self.yardsticks.get(k) {
-                lessons.deviation += yardstick.deviation(&latest);
+                lessons.deviation += yardstick.deviation(&latest, lessons.rows);
                 if lessons.weighs_filter {
-                    let own = band.primaries.iter().map(|p| p.light + p.weight * p.unfiltered);
-                    lessons.own_deviation += yardstick.deviation(&Shown::of_samples(own));
+                    lessons.traced += trace(context, yardstick, lessons.rows);
                     lessons.work += band.work();
+                    costs.stage("path tracing", 0);
                 }
             }
         }
@@ -191,7 +197,7 @@ impl Learnt {
     }
 
     /// Ends an iteration, all of whose bands are in the film. If it was stopped while they were taken in, what it says is
-    /// incomplete and decides nothing. `rays`: traced in it.
+    /// incomplete and decides nothing. `rays`: traced for its picture.
     pub fn end(
         &mut self,
         context: &Context,
@@ -200,6 +206,7 @@ impl Learnt {
         cut: &Cut,
         costs: &mut StageCosts,
     ) {
+        context.counters.rays.fetch_add(lessons.traced.rays, Relaxed);
         if cut.is_raised() {
             return;
         }
@@ -229,7 +236,7 @@ impl Learnt {
                     let hints = *locked(&context.counters.hints);
                     let error = context.film.estimated_error(hints).filter(|e| e.noise > 0.0);
                     let over_noise = error.map_or(1.0, |e| e.total() / e.noise);
-                    self.economy.judge_filter(departure, lessons.own_deviation, over_noise, work);
+                    self.economy.judge_filter(departure, lessons.traced, over_noise, work);
                 }
                 false => {
                     let must = Must {
@@ -244,30 +251,33 @@ impl Learnt {
     }
 
     /// Tells how much the kernels have blurred the picture, an iteration more included: those that do not filter add none.
-    fn tell_blur(&self, context: &Context) {
+    pub fn tell_blur(&self, context: &Context) {
         let share = f64::from(self.filtered) / f64::from(context.completed + 1);
         locked(&context.counters.hints).blur = self.adaptation.blur().map(|blur| blur * share * share);
     }
+}
 
-    /// The picture before an iteration that traces paths, if it will be compared: band by band.
-    pub fn before_paths(&self, context: &Context, index: u32) -> Option<Vec<Shown>> {
-        let of_band = |(place, _): &(Rect, Shown)| Shown::of(context.film, *place);
-        if self.economy.compares(index) { self.yardsticks.iter().map(of_band).collect() } else { None }
-    }
-
-    /// Ends an iteration that traced paths, all of which are in the film.
-    pub fn end_paths(&mut self, context: &Context, before: Option<Vec<Shown>>) {
-        self.tell_blur(context);
-        let Some(before) = before else { return };
-        let of_band = |((place, yardstick), before): (&(Rect, Shown), Shown)| {
-            let after = Shown::of(context.film, *place)?;
-            Some(yardstick.deviation(&before.latest(&after, context.completed)))
-        };
-        let found = self.yardsticks.iter().zip(before).map(of_band).sum::<Option<f64>>();
-        let departure = Departure { deviation: found.unwrap_or(f64::NAN), before: context.completed };
-        self.economy.judge_paths(departure);
-        *locked(&context.counters.left_out) = self.economy.left_out();
-    }
+/// What path tracing makes of some rows of a band, with [`PATHS`] samples a pixel.
+fn trace(context: &Context, yardstick: &Shown, rows: Rows) -> Traced {
+    let (width, area) = (context.crop.width as usize, context.crop.area());
+    let of_pixel = |k: usize| {
+        let (x, y) = ((k % width) as u32, (k / width) as u32);
+        let (mut halves, mut rays) = ([Vec3::ZERO; 2], 0);
+        for n in 0..if rows.have(k) { PATHS } else { 0 } {
+            if context.stop.is_raised() {
+                break;
+            }
+            let camera = context.further_camera_sample(x, y, n, n >> 1, PATHS / 2);
+            let (sample, taken) = path::sample(context, camera);
+            halves[n as usize & 1] += sample.radiance * (2.0 / PATHS as f32);
+            rays += taken as u32;
+        }
+        (halves, rays)
+    };
+    let traced: Vec<([Vec3; 2], u32)> = (0..area).into_par_iter().map(of_pixel).collect();
+    let halves = [0, 1].map(|half| Shown::of_samples(traced.iter().map(|(light, _)| light[half])));
+    let rays = traced.iter().map(|&(_, rays)| u64::from(rays)).sum();
+    Traced { rays, ..yardstick.noise_of_halves(&halves, rows) }
 }
 
 impl Lessons {

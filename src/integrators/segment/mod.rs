@@ -41,11 +41,10 @@ impl Integrator for Segment {
         let cut = Cut(&stopped);
         let mut costs = StageCosts::new(context.counters);
         if !self.learnt.filters(context, &self.techniques, index) {
-            let before = self.learnt.before_paths(context, index);
             let end = Path.iterate(context, index);
             costs.stage("path tracing", 0);
             if end == IterationEnd::Complete {
-                self.learnt.end_paths(context, before);
+                self.learnt.tell_blur(context);
             }
             return end;
         }

@@ -2,16 +2,21 @@
 //! are filtered, and no blur.
 //!
 //! It is asked where light paths do not pay, since what those bring comes by filtering alone. An iteration that filters is compared
-//! to the mean of those before, and so is what its camera paths find by themselves. If that is not far behind, the next iteration
-//! traces paths (`integrators::path`), with rays that are spent for that, and the pictures tell. Looking decides for later
-//! iterations: that biases nothing.
+//! to the mean of those before; paths are traced through some of its pixels (`integrators::path`) that do not enter the
+//! picture. Looking decides for later iterations: that biases nothing.
 
-use super::{Departure, WORTHWHILE};
+use super::Departure;
 use std::ops::AddAssign;
 
-/// How much less variance path tracing may have than the camera paths of an iteration that filters, which end earlier. A trial that
-/// fails is noise in the picture, so it has to be likely to succeed.
-const LIKELY: f64 = 1.5;
+/// Paths through a pixel by which path tracing is judged: it gains from their being spread evenly.
+pub const PATHS: u32 = 16;
+/// Relative variance after these, but for the worst hundredth of the pixels, below which path tracing is quiet,
+const QUIET: f64 = 0.04;
+/// if these do not add more than so many times as much.
+const EVEN: f64 = 2.0;
+/// How much less variance filtering has to bring to a quiet picture: path tracing gains by evenness with every further sample, and what is
+/// left of a filtered picture is soon its blur (`benches/NOTES.md`, *Paths that are not filtered*).
+const PATIENCE: f64 = 5.0;
 
 /// What an iteration that filters had to do.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,13 +31,16 @@ pub struct Work {
     pub pairs: u64,
 }
 
+/// Cost of so many rays and of what is shaded at their ends, in nanoseconds of the machine that this was measured on
+/// (`benches/NOTES.md`, *Paths that are not filtered*). To read a clock would be another picture every time.
+const RAY: f64 = 400.0;
+
 impl Work {
-    /// Costs of the camera's paths, and of filtering them, in nanoseconds of the machine that they were measured on
-    /// (`benches/NOTES.md`, *Paths that are not filtered*). To read a clock would be another picture every time.
-    fn costs(&self) -> [f64; 2] {
+    /// Cost, likewise.
+    fn cost(&self) -> f64 {
         let [rays, pixels, arrivals, pairs] =
             [self.rays, self.pixels, self.arrivals, self.pairs].map(|n| n as f64);
-        [400.0 * rays + 550.0 * arrivals, 640.0 * arrivals + 200.0 * pairs + 250.0 * pixels]
+        RAY * rays + 1350.0 * arrivals + 220.0 * pairs + 300.0 * pixels
     }
 }
 
@@ -45,30 +53,58 @@ impl AddAssign for Work {
     }
 }
 
-/// What the next iteration is for.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-enum Next {
-    /// The picture alone.
-    #[default]
-    Nothing,
-    /// It filters, to be compared with one that does not; iterations before, see [`Departure::before`].
-    Filtered(u32),
-    /// It does not filter.
-    Unfiltered {
-        /// As above.
-        before: u32,
-        /// Variance of the one before, which did.
-        variance: f64,
-        /// How many times as much variance may be in this one for filtering not to pay.
-        most: f64,
-    },
+/// What path tracing made of some pixels, with [`PATHS`] samples of each.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Traced {
+    /// How far that is from the truth, in the units of a [`Departure`].
+    pub deviation: f64,
+    /// Sum of the pixels' relative variances.
+    pub noise: f64,
+    /// The same without the worst hundredth.
+    pub calm: f64,
+    /// Pixels.
+    pub pixels: usize,
+    /// Rays.
+    pub rays: u64,
+}
+
+impl Traced {
+    /// Squared departure of one sample a pixel, if every further one brings as much as these have.
+    fn variance(&self) -> f64 {
+        f64::from(PATHS) * self.deviation * self.deviation
+    }
+
+    /// Cost of a sample of so many pixels.
+    fn cost(&self, pixels: u64) -> f64 {
+        let a_path = self.rays as f64 / (self.pixels as f64 * f64::from(PATHS));
+        // at every arrival one ray to a light, and one that goes on
+        let arrivals = 0.5 * (a_path - 1.0).max(0.0);
+        pixels as f64 * (RAY * a_path + 400.0 * arrivals)
+    }
+
+    fn is_quiet(&self) -> bool {
+        self.calm < QUIET * self.pixels as f64 && self.noise < EVEN * self.calm
+    }
+}
+
+impl AddAssign for Traced {
+    fn add_assign(&mut self, other: Self) {
+        self.deviation += other.deviation;
+        self.noise += other.noise;
+        self.calm += other.calm;
+        self.pixels += other.pixels;
+        self.rays += other.rays;
+    }
 }
 
 /// What has been found out about the worth of filtering.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FilterEconomy {
     is_left_out: bool,
-    next: Next,
+    /// Whether path tracing was quiet.
+    is_quiet: bool,
+    /// Whether the next iteration is to be compared with path tracing, and the iterations before, see [`Departure::before`].
+    looks: Option<u32>,
 }
 
 impl FilterEconomy {
@@ -79,21 +115,22 @@ impl FilterEconomy {
 
     /// Whether the next iteration filters if light paths need not.
     pub fn filters(&self) -> bool {
-        match self.next {
-            Next::Nothing => !self.is_left_out,
-            Next::Filtered(_) => true,
-            Next::Unfiltered { .. } => false,
-        }
+        self.looks() || !self.is_left_out
     }
 
-    /// Whether the next iteration has to be compared to those before.
-    pub fn compares(&self) -> bool {
-        self.next != Next::Nothing
+    /// Whether it is left out for good: path tracing is quiet, and nothing is missing.
+    pub fn is_settled(&self) -> bool {
+        self.is_left_out && self.is_quiet
     }
 
-    /// The next two iterations find out, after light paths were looked at and found not to pay with so many iterations before.
+    /// Whether the next iteration is to be compared with path tracing.
+    pub fn looks(&self) -> bool {
+        self.looks.is_some()
+    }
+
+    /// The next iteration finds out, after light paths were looked at and found not to pay with so many iterations before.
     pub fn begin(&mut self, before: u32) {
-        self.next = if before > 0 { Next::Filtered(before) } else { Next::Nothing };
+        self.looks = (before > 0).then_some(before);
     }
 
     /// All iterations filter, until told otherwise.
@@ -101,27 +138,17 @@ impl FilterEconomy {
         *self = Self::default();
     }
 
-    /// Judges after an iteration that filtered. `own`: how far off its camera paths are by themselves; `error_over_noise`: of the
-    /// picture so far.
-    pub fn judge_filtered(&mut self, departure: Departure, own: f64, error_over_noise: f64, work: Work) {
-        let Next::Filtered(before) = self.next else { return };
-        let [sampling, filtering] = work.costs();
+    /// Judges after an iteration that filtered. `filtered`: its departure; `error_over_noise`: of the picture so far.
+    pub fn judge(&mut self, filtered: Departure, traced: Traced, error_over_noise: f64, work: Work) {
+        let Some(before) = self.looks.take() else { return };
         // the mean varies as well, about as much as so many iterations
-        let of_mean = departure.squared() / f64::from(before + 1);
-        let (variance, own) = (departure.squared() - of_mean, own * own - of_mean);
-        let most = error_over_noise.max(1.0) * (sampling + filtering) / (WORTHWHILE * sampling);
-        let is_likely = own < LIKELY * most * variance;
-        self.is_left_out &= is_likely;
-        self.next = if is_likely { Next::Unfiltered { before, variance, most } } else { Next::Nothing };
-    }
-
-    /// Judges after an iteration that traced paths.
-    pub fn judge_unfiltered(&mut self, departure: Departure) {
-        let Next::Unfiltered { before, variance, most } = self.next else { return };
-        let unfiltered = departure.squared() - variance / f64::from(before);
+        let variance = filtered.squared() * (1.0 - 1.0 / f64::from(before + 1));
+        let filtering = variance * work.cost() * error_over_noise.max(1.0);
+        let tracing = traced.variance() * traced.cost(work.pixels);
+        self.is_quiet = traced.is_quiet();
+        let patience = if self.is_quiet { PATIENCE } else { 1.0 };
         // what is not a number decides nothing
-        self.is_left_out = unfiltered < most * variance;
-        self.next = Next::Nothing;
+        self.is_left_out = tracing < patience * filtering;
     }
 }
 
@@ -129,63 +156,57 @@ impl FilterEconomy {
 mod tests {
     use super::*;
 
-    const WORK: Work = Work { rays: 1000, pixels: 100, arrivals: 400, pairs: 2000 };
+    const WORK: Work = Work { pixels: 100, rays: 1000, arrivals: 400, pairs: 2000 };
 
-    /// After four iterations, of which one that filters and one that does not departed by so much.
-    fn judged(filtered: f64, unfiltered: f64, error_over_noise: f64) -> FilterEconomy {
-        let mut economy = FilterEconomy::default();
-        assert!(economy.filters() && !economy.compares());
-        economy.begin(4);
-        assert!(economy.filters() && economy.compares());
-        economy.judge_filtered(departure(filtered), unfiltered.min(filtered), error_over_noise, WORK);
-        assert!(!economy.filters() && economy.compares());
-        economy.judge_unfiltered(departure(unfiltered));
-        assert!(!economy.compares());
-        economy
+    /// Paths of 11 rays: five arrivals.
+    fn traced(deviation: f64, noise: f64, calm: f64) -> Traced {
+        Traced { deviation, noise, calm, pixels: 50, rays: 50 * 11 * u64::from(PATHS) }
     }
 
-    fn departure(deviation: f64) -> Departure {
-        Departure { deviation, before: 4 }
+    /// After four iterations and one that departed by so much.
+    fn judged(filtered: f64, traced: Traced, error_over_noise: f64) -> FilterEconomy {
+        let mut economy = FilterEconomy::default();
+        assert!(economy.filters() && !economy.looks());
+        economy.begin(4);
+        assert!(economy.filters() && economy.looks());
+        let departure = Departure { deviation: filtered, before: 4 };
+        economy.judge(departure, traced, error_over_noise, WORK);
+        assert!(!economy.looks());
+        economy
     }
 
     #[test]
     fn filtering_is_left_out_where_more_paths_have_less_error() {
-        // costs 620 + 681 for 620: twice the variance pays, at a gain of a tenth
-        let [sampling, filtering] = WORK.costs();
-        let most = (sampling + filtering) / (1.1 * sampling);
-        assert!((1.8..2.0).contains(&most), "{most}");
-        // variances: 5 - 5/5 = 4 of the filtered one, d² - 4/4 of the other
-        let filtered = 5.0f64.sqrt();
-        let at = |ratio: f64, told| judged(filtered, (ratio * 4.0 + 1.0).sqrt(), told).is_left_out();
-        assert!(at(0.99 * most, 1.0) && !at(1.01 * most, 1.0));
+        let most = WORK.cost() / traced(1.0, 1.0, 1.0).cost(WORK.pixels);
+        assert!((2.0..2.5).contains(&most), "{most}");
+        // a variance of 5 - 5/5 = 4, and of paths so many times that
+        let at = |ratio: f64, told, noise: f64, calm: f64| {
+            let deviation = (ratio * 4.0 / f64::from(PATHS)).sqrt();
+            judged(5.0f64.sqrt(), traced(deviation, noise, calm), told).is_left_out()
+        };
+        let noisy = 2.0 * QUIET * 50.0;
+        assert!(at(0.99 * most, 1.0, noisy, noisy) && !at(1.01 * most, 1.0, noisy, noisy));
         // blur speaks against the filter
-        assert!(at(1.01 * most, 1.1) && !at(1.01 * most, 0.5));
-        assert!(!judged(filtered, f64::NAN, 1.0).is_left_out());
-    }
-
-    #[test]
-    fn nothing_is_tried_that_is_not_likely() {
-        let [sampling, filtering] = WORK.costs();
-        let most = (sampling + filtering) / (1.1 * sampling);
-        for (ratio, tries) in [(0.99 * 1.5 * most, true), (1.01 * 1.5 * most, false), (f64::NAN, false)] {
-            let mut economy = FilterEconomy::default();
-            economy.begin(4);
-            let own = (ratio * 4.0 + 1.0).sqrt();
-            economy.judge_filtered(departure(5.0f64.sqrt()), own, 1.0, WORK);
-            assert_eq!((economy.compares(), economy.filters()), (tries, !tries));
-        }
+        assert!(at(1.01 * most, 1.1, noisy, noisy) && !at(1.01 * most, 0.5, noisy, noisy));
+        // and so does quiet, unless a few pixels break it
+        let quiet = 0.5 * QUIET * 50.0;
+        assert!(
+            at(0.99 * PATIENCE * most, 1.0, quiet, quiet) && !at(1.01 * PATIENCE * most, 1.0, quiet, quiet)
+        );
+        assert!(!at(1.01 * most, 1.0, 1.01 * EVEN * quiet, quiet));
+        assert!(!at(f64::NAN, 1.0, quiet, quiet));
     }
 
     #[test]
     fn it_comes_back_with_light_paths() {
-        let mut economy = judged(1.0, 1.0, 1.0);
+        let mut economy = judged(1.0, traced(0.1, 1.0, 1.0), 1.0);
         assert!(!economy.filters());
         // and is looked at again
         economy.begin(15);
         assert!(economy.filters());
         economy.keep();
-        assert!(economy.filters() && !economy.compares());
+        assert!(economy.filters() && !economy.looks());
         economy.begin(0);
-        assert!(!economy.compares(), "nothing to compare with");
+        assert!(!economy.looks(), "nothing to compare with");
     }
 }
