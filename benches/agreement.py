@@ -318,7 +318,10 @@ def threshold(tests: int) -> float:
 def verdict(off: float, error: float, most: float, weakness: str) -> str:
     """What a relative deviation means, of which so many standard errors may be accident."""
     if abs(off) > max(LIMIT, most * error):
-        return CANNOT if weakness == CANNOT and off < 0 else "differs"
+        if not weakness or off > 0:
+            return "differs"
+        # what was not met by chance is in no standard error
+        return CANNOT if weakness == CANNOT else f"too noisy to say, {CHANCE}"
     if error <= LIMIT and abs(off) <= max(LIMIT, 2.0 * error):
         return "agrees"
     return "too noisy to say" + (f", {CHANCE}" if weakness == CHANCE else "")

@@ -178,6 +178,11 @@ impl Tile {
         self.counts.iter().map(|&n| n as u64).sum()
     }
 
+    /// Samples that were delivered, whether they count or not.
+    pub fn delivered(&self) -> u64 {
+        self.total_count() + self.rejected
+    }
+
     /// Samples that were left out.
     pub(super) fn rejected(&self) -> u64 {
         self.rejected

@@ -231,7 +231,8 @@ pub enum IterationEnd {
 /// One method of computing light transport.
 pub trait Integrator: Send {
     /// Adds about one sample a pixel to the film. May return early, with whole samples only, when the
-    /// stop sign is raised. `index` counts the calls, for the random numbers.
+    /// stop sign is raised. `index` counts iterations, for the random numbers; one that was cut short has the same again
+    /// and goes on where it ended, unless it is all or nothing.
     fn iterate(&mut self, context: &Context, index: u32) -> IterationEnd;
 
     /// Whether an iteration that is cut short leaves nothing in the film, or but a few bands of it.

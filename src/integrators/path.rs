@@ -44,11 +44,14 @@ impl Integrator for Path {
     fn rest(&mut self) {}
 }
 
-/// Returns whether all its pixels were sampled.
+/// Returns whether all its pixels were sampled. An iteration that was cut short goes on where it ended: short slices of
+/// time would else never come to the last tiles.
 fn render_tile(context: &Context, index: u32, shared: &SharedTile) -> bool {
     let (mut rays, mut complete) = (0, true);
     let mut tile = shared.lock();
-    for (x, y) in shared.rect().pixels() {
+    let before = u64::from(context.completed) * shared.rect().area() as u64;
+    let done = tile.delivered().saturating_sub(before) as usize;
+    for (x, y) in shared.rect().pixels().skip(done) {
         if context.stop.is_raised() {
             complete = false;
             break;

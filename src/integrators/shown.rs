@@ -11,8 +11,8 @@ const DARK: f32 = 0.1;
 /// Pixels whose deviations are judged together.
 const ROW: usize = 64;
 /// So many rows tell how noisy a picture is; of large pictures this share.
-const ENOUGH: usize = 64;
-const LEAST: f32 = 1.0 / 16.0;
+const ENOUGH: usize = 48;
+const LEAST: f32 = 1.0 / 32.0;
 
 /// Which rows of pixels are compared: chosen at random, so many of them on average.
 #[derive(Clone, Copy, Debug)]

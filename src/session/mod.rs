@@ -219,7 +219,9 @@ impl Session {
                 if !self.cancelled.load(Relaxed) && events.progress(&self.progress(before + seconds)) {
                     self.cancel();
                 }
-                if ends_early && self.settings.limits.seconds.is_some_and(|limit| seconds >= limit) {
+                let is_late = self.settings.limits.seconds.is_some_and(|limit| seconds >= limit);
+                // every pixel has one sample at least
+                if ends_early && is_late && locked(&self.state).iterations > 0 {
                     self.stop.raise();
                 }
                 // showing pixels costs time: often at first, then ever more rarely
@@ -290,8 +292,10 @@ impl Session {
             if !self.stop.is_raised() {
                 let end = self.pool.install(|| integrator.iterate(&context(iterations), index));
                 let mut state = locked(&self.state);
-                // one that was cut short is begun too: its samples must not be drawn again
-                state.begun = index.saturating_add(1);
+                // one that leaves nothing when it is cut short is not gone on with, and its samples must not be drawn again
+                if end == IterationEnd::Complete || integrator.is_all_or_nothing() {
+                    state.begun = index.saturating_add(1);
+                }
                 if end == IterationEnd::Complete {
                     state.iterations = iterations.saturating_add(1);
                 }
