@@ -113,4 +113,30 @@ mod tests {
         let expected = 2.0 * (32.0f64 * (0.01 + 0.09)).sqrt() / 1.1;
         assert!((mean.deviation(&found, Rows::ALL) - expected).abs() < 1e-4 * expected);
     }
+    #[test]
+    fn halves_tell_the_noise_of_their_mean() {
+        let mean = Shown(vec![1.0; 6400]);
+        let mut halves = [0.9, 1.1].map(|l| Shown(vec![l; 6400]));
+        (halves[0].0[70], halves[1].0[70], halves[1].0[900]) = (1.0, 21.0, f32::NAN);
+        let found = mean.noise_of_halves(&halves, Rows::ALL);
+        let (usual, worst) = ((0.1f64 / 1.1).powi(2), (10.0f64 / 1.1).powi(2));
+        let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
+        assert_eq!(found.pixels, 6399);
+        close(found.noise, 6398.0 * usual + worst);
+        // without 63
+        close(found.calm, 6336.0 * usual);
+        let rows = [98.0 * 8.0 * usual.sqrt(), (63.0 * usual + worst).sqrt(), (63.0 * usual).sqrt()];
+        close(found.deviation, rows.iter().sum());
+    }
+
+    #[test]
+    fn some_of_the_rows_of_a_large_picture_are_enough() {
+        let counted = |pixels: usize| {
+            let rows = Rows::some(pixels, 3);
+            (0..pixels).step_by(ROW).filter(|&k| rows.have(k)).count()
+        };
+        assert_eq!(counted(ENOUGH * ROW), ENOUGH);
+        assert!((30..70).contains(&counted(400 * ROW)), "{}", counted(400 * ROW));
+        assert!((700..900).contains(&counted(32 * 800 * ROW)), "{}", counted(32 * 800 * ROW));
+    }
 }
