@@ -218,19 +218,20 @@ class Place:
         jobs = [
             Render(self.scene, {**settings, "seed": seed + k}) for k in range(SEEDS)
         ]
-        seconds, wanted = LEAST, True
-        while wanted:
+        seconds = LEAST
+        while True:
             for job in jobs:
                 while job.stats()["cpu_seconds"] < seconds:
                     job.run()
             row = Row(budget, *self.parts(jobs))
-            wanted = seconds < MOST and row.gains_from_more(seconds)
-            spent, seconds = seconds, min(2.0 * seconds, MOST)
+            if seconds >= MOST or not row.gains_from_more(seconds):
+                break
+            seconds = min(2.0 * seconds, MOST)
         file.parent.mkdir(parents=True, exist_ok=True)
         file.with_suffix(".unfinished").write_text(json.dumps(asdict(row)))
         file.with_suffix(".unfinished").replace(file)
         mean, error = row.estimate(ALL)
-        print(f"{name}: {mean:.5g} ± {error / mean:.2%}, {spent:g} s", flush=True)
+        print(f"{name}: {mean:.5g} ± {error / mean:.2%}, {seconds:g} s", flush=True)
         return row
 
     def parts(self, jobs: list[Render]) -> tuple[list, list, list]:
@@ -320,9 +321,10 @@ def verdict(off: float, error: float, most: float, weakness: str) -> str:
     if abs(off) > max(LIMIT, most * error):
         if not weakness or off > 0:
             return "differs"
+        if weakness == CANNOT:
+            return CANNOT
         # what was not met by chance is in no standard error
-        return CANNOT if weakness == CANNOT else f"too noisy to say, {CHANCE}"
-    if error <= LIMIT and abs(off) <= max(LIMIT, 2.0 * error):
+    elif error <= LIMIT and abs(off) <= max(LIMIT, 2.0 * error):
         return "agrees"
     return "too noisy to say" + (f", {CHANCE}" if weakness == CHANCE else "")
 

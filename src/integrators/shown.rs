@@ -73,14 +73,13 @@ impl Shown {
     /// How far a picture is from this one: relative deviations, squared over short rows of pixels and summed over
     /// these, so that a few bright specks do not decide.
     pub fn deviation(&self, other: &Self, rows: Rows) -> f64 {
-        let squares = self.squares(self.0.iter().zip(&other.0).map(|(a, b)| b - a), rows);
-        squares.iter().map(|row| row.iter().sum::<f64>().sqrt()).sum()
+        rooted(&self.squares(self.0.iter().zip(&other.0).map(|(a, b)| b - a), rows))
     }
 
     /// How far the mean of two independent pictures is from the truth, on average, relative to the brightness here.
     pub fn noise_of_halves(&self, [a, b]: &[Self; 2], rows: Rows) -> Traced {
         let squares = self.squares(a.0.iter().zip(&b.0).map(|(a, b)| 0.5 * (b - a)), rows);
-        let deviation = squares.iter().map(|row| row.iter().sum::<f64>().sqrt()).sum();
+        let deviation = rooted(&squares);
         let mut sorted: Vec<f64> = squares.into_iter().flatten().collect();
         sorted.sort_by(f64::total_cmp);
         let (pixels, noise) = (sorted.len(), sorted.iter().sum());
@@ -96,6 +95,11 @@ impl Shown {
         let counted = squares.chunks(ROW).enumerate().filter(|&(row, _)| rows.count(row));
         counted.map(|(_, row)| finite(row)).collect()
     }
+}
+
+/// Roots of the sums of rows, summed.
+fn rooted(squares: &[Vec<f64>]) -> f64 {
+    squares.iter().map(|row| row.iter().sum::<f64>().sqrt()).sum()
 }
 
 #[cfg(test)]

@@ -93,17 +93,17 @@ impl Band {
         primary.arrival.map_or(Vec3::ZERO, |a| self.reflected.towards_camera(sampled, a as usize))
     }
 
-    /// What was done up to the film, but for rays, as far as it would have been without light paths.
+    /// What was done up to the film but for rays, as far as it would have been without light paths.
     pub fn work(&self) -> Work {
         let of_cluster = |c: &Cluster| match c.class {
             SurfaceClass::Diffuse => 0,
             SurfaceClass::Reflecting | SurfaceClass::Transmitting => u64::from(c.cameras).pow(2),
         };
         Work {
+            rays: 0,
             pixels: self.primaries.len() as u64,
             arrivals: self.camera.arrivals.len() as u64,
             pairs: self.clusters.clusters.iter().map(of_cluster).sum(),
-            rays: 0,
         }
     }
 

@@ -96,7 +96,10 @@ impl Learnt {
         }
         self.glances.begin(context.crop, context.world.needs().mirrors);
         let weighs_filter = compares && self.economy.weighs_filter(index);
-        let some = || Rows::some(context.crop.area(), hash(context.seed, index));
+        let rows = match weighs_filter {
+            true => Rows::some(context.crop.area(), hash(context.seed, index)),
+            false => Rows::ALL,
+        };
         Lessons {
             techniques,
             index,
@@ -107,7 +110,7 @@ impl Learnt {
             bands,
             deviation: 0.0,
             weighs_filter,
-            rows: if weighs_filter { some() } else { Rows::ALL },
+            rows,
             traced: Traced::default(),
             work: Work::default(),
             beyond: 0.0,

@@ -31,12 +31,12 @@ pub struct Work {
     pub pairs: u64,
 }
 
-/// Cost of so many rays and of what is shaded at their ends, in nanoseconds of the machine that this was measured on
+/// Cost of a ray, in nanoseconds of the machine that this and what else work costs were measured on
 /// (`benches/NOTES.md`, *Paths that are not filtered*). To read a clock would be another picture every time.
 const RAY: f64 = 400.0;
 
 impl Work {
-    /// Cost, likewise.
+    /// Cost of all.
     fn cost(&self) -> f64 {
         let [rays, pixels, arrivals, pairs] =
             [self.rays, self.pixels, self.arrivals, self.pairs].map(|n| n as f64);
@@ -156,7 +156,7 @@ impl FilterEconomy {
 mod tests {
     use super::*;
 
-    const WORK: Work = Work { pixels: 100, rays: 1000, arrivals: 400, pairs: 2000 };
+    const WORK: Work = Work { rays: 1000, pixels: 100, arrivals: 400, pairs: 2000 };
 
     /// Paths of 11 rays: five arrivals.
     fn traced(deviation: f64, noise: f64, calm: f64) -> Traced {
