@@ -16,7 +16,7 @@ const QUIET: f64 = 0.04;
 const EVEN: f64 = 2.0;
 /// How much less variance filtering has to bring to a quiet picture: path tracing gains by evenness with every further sample, and what is
 /// left of a filtered picture is soon its blur (`benches/NOTES.md`, *Paths that are not filtered*).
-const PATIENCE: f64 = 5.0;
+const PATIENCE: f64 = 2.0;
 
 /// What an iteration that filters had to do.
 #[derive(Clone, Copy, Debug, Default)]
